@@ -38,7 +38,7 @@ from service.views.whole import VIEWS_KEPT, Priors, Views
 
 
 def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:
-    """Makes the service as an ASGI application, which uses disk and processes only once started.
+    """Makes the ASGI application; uses disk and processes only once started.
 
     Args:
       settings: the environment's settings.

@@ -1,4 +1,4 @@
-"""`python -m service.demo`: starts the service, searches over REST for a planted defect, and shows what it found."""
+"""`python -m service.demo`: starts the service and searches for a planted defect."""
 
 import argparse
 import contextlib
@@ -35,7 +35,7 @@ class DemoError(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the demo; returns the exit status: 0 with a valid failure found, 1 without."""
+    """Runs the demo; exit status 0 with a valid failure, else 1."""
     options = _parser().parse_args(arguments)
     try:
         with _service(options.data_dir) as client:
@@ -111,7 +111,7 @@ def _spec(options: argparse.Namespace) -> dict[str, object]:
 
 @contextlib.contextmanager
 def _service(data_dir: Path) -> Iterator[Client]:
-    """Runs the service on a free loopback port for the body; yields its client."""
+    """Runs the service on a free loopback port; yields its client."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)  # the mode that the service asks for
@@ -162,7 +162,7 @@ def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[E
 
 
 def first_detections(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> Mapping[str, Episode | None]:
-    """Returns of each search, by id, the first failure that detects the defect; see `detected`."""
+    """Returns each search's first failure that detects the defect, by run id."""
     from risk_sac.failures.play import detected  # here, because loading the simulator takes seconds
 
     detections: dict[str, Episode | None] = {}
@@ -195,7 +195,7 @@ def _series(campaign_id: str, failure: Episode) -> str:
 
 
 def draw_command(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> str:
-    """Returns the command that draws the first failure for the headline, else a preventable one, else the first."""
+    """Returns the command that draws the best-ranked failure, the earliest of ties."""
     order = [run.id for run in campaign.runs]
     first = min(failures, key=lambda each: (*_rank(each), order.index(each.run_id)))
     program, here = Path(sys.executable).with_name("risk-sac"), Path.cwd()
@@ -205,7 +205,7 @@ def draw_command(campaign: Campaign, failures: Sequence[Episode], data_dir: Path
 
 
 def _rank(failure: Episode) -> tuple[bool, bool]:
-    """Returns what is lower for a headline candidate, then for a preventable failure."""
+    """Returns a sort key: headline candidates first, then preventable failures."""
     valid = failure.valid_violations
     return not any(each.headline_candidate for each in valid), not any(each.preventable for each in valid)
 

@@ -40,12 +40,12 @@ class KeysError(ServiceError):
 
 
 class StorageError(ServiceError):
-    """Read or write that database or data folder refused; the message is the reason."""
+    """Read or write refused by database or disk; the message says why."""
 
 
 @contextmanager
 def disk_refusals(what: str) -> Iterator[None]:
-    """Turns an error of the disk within the body into a StorageError that says what cannot be done."""
+    """Turns an OSError within the body into a StorageError about `what`."""
     try:
         yield
     except OSError as error:
@@ -53,19 +53,19 @@ def disk_refusals(what: str) -> Iterator[None]:
 
 
 class OutdatedError(StorageError):
-    """Stored campaign that this version refuses: it can be listed and deleted; its runs fail."""
+    """Stored campaign of an incompatible version: listable, deletable; its runs fail."""
 
 
 class SeriesLost(StorageError):
-    """Time series of a failure that was not recorded, is missing or damaged."""
+    """Time series of a failure that is not recorded, missing or damaged."""
 
 
 class NotPlayable(ServiceError):
-    """Failure that does not repeat, or cannot be played as requested; the message says why."""
+    """Failure that does not repeat or cannot play; the message says why."""
 
 
 class UploadError(ServiceError):
-    """Upload that is refused or does not load; the message says what and where."""
+    """Upload refused or not loadable; the message says what and where."""
 
 
 class BusyError(ServiceError):
@@ -78,4 +78,4 @@ class BusyError(ServiceError):
 
 
 class TransitionError(ServiceError):
-    """State change outside the table of transitions: a bug, not a user's mistake."""
+    """State change outside the table of transitions: a bug in the service."""

@@ -41,7 +41,7 @@ def hold_data_folder(folder: Path) -> IO[bytes]:
 
 
 def _close_to_others(folder: Path) -> None:
-    """Makes a data folder private; refuses folders of other programs, such as /var/lib."""
+    """Makes a data folder private; refuses folders of other programs (/var/lib)."""
     status = folder.stat()
     mode, able = stat.S_IMODE(status.st_mode), os.geteuid() in (status.st_uid, 0)
     names = {path.name for path in folder.iterdir()} - NEW_VOLUME

@@ -237,7 +237,7 @@ def takes(field: dict[str, Any]) -> str:
 
 
 def _default(field: dict[str, Any]) -> str:
-    """Returns the default as a user writes it; a dash for none or machine-dependent ones."""
+    """Returns a field's default as users write it, a dash for none."""
     default = field.get("default")
     if default is None:
         return "–"

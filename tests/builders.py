@@ -1,4 +1,4 @@
-"""Frames and records to test with, from what a test speaks of; the rest is ordinary.
+"""Frames and records for tests: the test's values, the rest ordinary.
 
 In frames it is at rest, straight ahead and of a car's size. Records tell of an ego that runs into the car before it.
 """
@@ -54,7 +54,7 @@ def frame_of(
     link: Sequence[int] | None = None,
     **rows: float | Sequence[float] | Floats,
 ) -> Frame:
-    """A frame of `n` actors, the ego first, from the rows of its state.
+    """Makes a frame of `n` actors, the ego first, from state rows.
 
     Args:
       kind: `n`; vehicles if not given.
@@ -99,7 +99,7 @@ def moved(frame: Frame, **rows: float | Sequence[float] | Floats) -> Frame:
 def belief_of(
     frame: Frame, hidden: Collection[str] = (), expected: Mapping[str, Sequence[float]] | None = None
 ) -> "Belief":
-    """That the ego knows nothing of some actors, and expects others at x, y, heading with a velocity."""
+    """Belief without `hidden` actors, with others expected at x, y, heading, velocity."""
     from risk_sac.sim.ego import MOTION, Belief  # here, because it loads a compiler, which workers of records need not
 
     state = frame.state.copy()
@@ -109,7 +109,7 @@ def belief_of(
 
 
 class Told:
-    """Senses of an ego that is told what to make of the k-th frame of an episode."""
+    """Senses of an ego, given by a function of frame and number."""
 
     def __init__(self, tell: "Callable[[Frame, int], Belief]") -> None:
         self.tell = tell
@@ -124,7 +124,7 @@ class Told:
 
 
 def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, **changes: Any) -> Judgement:
-    """Of a vehicle that cuts in while the ego drives straight; the drivers' outcomes follow from the grade."""
+    """Judgement of a cut-in on a straight ego; outcomes follow the grade."""
     values: dict[str, Any] = {
         "definitions": 1,
         "conflict_type": ConflictType.CUT_IN,
@@ -159,7 +159,7 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
 
 
 def plausibility(verdict: PlausibilityClass = PlausibilityClass.ORDINARY, **changes: Any) -> Plausibility:
-    """Of an adversary that brakes by 5.0 m/s² once; its probabilities do not follow from the verdict."""
+    """Plausibility of one braking by 5.0 m/s²; probabilities do not follow `verdict`."""
     braking = BehaviourFact(
         actor="lead", feature="braking", value=5.0, time_s=2.0, times=1, probability=0.04, published=True
     )
@@ -173,7 +173,7 @@ def plausibility(verdict: PlausibilityClass = PlausibilityClass.ORDINARY, **chan
 
 
 def collision(**changes: Any) -> Collision:
-    """The ego's front against the rear of the car before it; not graded, and by no rule refused."""
+    """The ego's front hits the car ahead; ungraded, refused by no rule."""
     values: dict[str, Any] = {
         "time_s": 3.2,
         "other_id": "lead",
@@ -201,7 +201,7 @@ def collision(**changes: Any) -> Collision:
 
 
 def violation(**changes: Any) -> Violation:
-    """Of `never_fast`, 1.5 s after the release, by an ego that drives straight near no other; refused by no rule."""
+    """Violation of `never_fast` 1.5 s after the release, refused by no rule."""
     values: dict[str, Any] = {
         "requirement": "never_fast",
         "time_s": 1.5,
@@ -227,7 +227,7 @@ def violation(**changes: Any) -> Violation:
 
 
 def episode_record(index: int = 0, outcome: Outcome = Outcome.SAFE, **changes: Any) -> EpisodeRecord:
-    """Of the search; none before it was longer or shorter, and one that was refused has no step."""
+    """Episode of the search; earlier ones were equally long, refused ones empty."""
     steps = changes.get("steps", 0 if outcome is Outcome.REJECTED else 100)
     values: dict[str, Any] = {
         "phase": "search",

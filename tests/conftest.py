@@ -23,13 +23,13 @@ def pytest_collection() -> Iterator[object]:  # None of the thousands of tests i
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts the unit tests last: their many short files let all processes end together."""
+    """Puts unit tests last: many short files end all processes together."""
     items.sort(key=lambda item: item.nodeid.startswith("tests/unit/"))
 
 
 @pytest.fixture(scope="session", autouse=True)
 def every_failure_is_clean(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Looks into all run folders of the session: before no valid contact may two bodies overlap."""
+    """Checks the session's run folders: no bodies overlap before valid contacts."""
     yield
     unclean = {}
     for results in tmp_path_factory.getbasetemp().rglob("results.json"):
@@ -41,7 +41,7 @@ def every_failure_is_clean(tmp_path_factory: pytest.TempPathFactory) -> Iterator
 
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[PostgreSql]:
-    """A PostgreSQL server; tests that need one are skipped where it is not installed."""
+    """Starts a PostgreSQL server; skips tests where it is not installed."""
     bin_ = binaries()
     if bin_ is None:
         pytest.skip("PostgreSQL is not installed")
@@ -51,7 +51,7 @@ def postgresql() -> Iterator[PostgreSql]:
 
 @pytest.fixture
 def steering_egos(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Registers the egos of tests/egos, in this process and in those that it starts."""
+    """Registers the egos of tests/egos, in this process and its children."""
     folder = str(Path(__file__).parent / "egos")
     monkeypatch.syspath_prepend(folder)
     others = os.environ.get("PYTHONPATH")

@@ -1,4 +1,4 @@
-"""Folders of runs that a search can go on from; nothing is simulated."""
+"""Folders of runs that a search can start from; nothing is simulated."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ FAILURES, SAFE = 2, 3
 
 
 def _episodes(family: str, *, scripts: bool = True) -> list[EpisodeRecord]:
-    """Two failures of one kind, then safe ones; the point of each is another row of the shipped library."""
+    """Two failures of one kind, then safe episodes, at shipped library points."""
     space, points, found = FAMILIES[family].space, shipped_library(family).points, []
     for index in range(FAILURES + SAFE):
         scene, genes = space.from_unit(points[index][: space.dimension]), points[index][space.dimension :]

@@ -19,7 +19,7 @@ CPP_COMPILES = all(map(shutil.which, ("make", "g++", "protoc", "grpc_cpp_plugin"
 
 @contextmanager
 def running(command: Sequence[str], folder: Path, **told: float) -> Iterator[str]:
-    """An ego's server at work; yields the table with which an operator registers it, without its name."""
+    """Runs an ego's server; yields the table that registers it, without name."""
     with (
         (folder / "ego.log").open("wb") as log,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
@@ -51,7 +51,7 @@ def served_by_cpp(folder: Path, **told: float) -> Iterator[str]:
 
 
 class Shadow:
-    """Keeps its lane, at the speeds that another driver drove at; it ignores all actors and hardly computes."""
+    """Ego that keeps its lane at another driver's speeds and ignores actors."""
 
     version = "1"
     response_time_s = 1.0
@@ -72,7 +72,7 @@ class Shadow:
 
 
 class Noting:
-    """Keeps its lane, and notes the seed of each episode in its server's log."""
+    """Ego that keeps its lane and logs the seed of each episode."""
 
     version = "1"
     response_time_s = 1.0

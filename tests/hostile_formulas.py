@@ -1,4 +1,4 @@
-"""STL formulas that want to take long, to take memory, or to be understood as something else; always the same ones."""
+"""STL formulas that cost time or memory or are ambiguous; fixed set."""
 
 import itertools
 from collections.abc import Iterator
@@ -75,7 +75,7 @@ def _numbers() -> Iterator[str]:
 
 
 def _bounds() -> Iterator[str]:
-    """Windows that are none, that are endless, or that end before they begin."""
+    """Windows that are invalid, endless, or end before they begin."""
     for bound in BOUNDS:
         yield f"historically[{bound}]({P})"
         yield f"({P}) since[{bound}] ({Q})"

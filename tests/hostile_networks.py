@@ -1,4 +1,4 @@
-"""Uploads that want to do harm, each made when it is asked for; none is kept in the repository."""
+"""Harmful uploads, each made on demand; none is kept in the repository."""
 
 import gzip
 import io
@@ -98,7 +98,7 @@ def _documents() -> Iterator[Hostile]:
 
 
 def _nets() -> Iterator[Hostile]:
-    """Nets with numbers that are none, with parts that are not there, or at which SUMO crashes."""
+    """Nets with invalid numbers, missing parts, or at which SUMO crashes."""
     shape, cannot = "0.00,-1.60 100.00,-1.60", "the simulator cannot load it: "
     light = '<tlLogic id="east" type="static" programID="0" offset="0"><phase duration="-5" state="r"/></tlLogic>'
     via = '<connection from="road" to="road" fromLane="0" toLane="0" via=":x_0_0" dir="s" state="M"/>'
@@ -134,7 +134,7 @@ def _located(projection: str) -> str:
 
 
 def _dead_end() -> bytes:
-    """A net of ours in which a lane inside a junction leads nowhere."""
+    """Our net with a lane inside a junction that leads nowhere."""
     lines = DENSE.read_bytes().splitlines(keepends=True)
     left = [line for line in lines if b'from=":centre_13" to="to_east"' not in line]
     assert len(left) < len(lines)

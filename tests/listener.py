@@ -7,7 +7,7 @@ from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 
 @dataclass
 class Listener:
-    """Keeps every record, and ends the run after so many episodes of this process."""
+    """Observer that keeps every record and stops the run after `limit`."""
 
     limit: int = 10**9
     records: list[EpisodeRecord] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Maps of a town that does not exist, in the formats that real ones come in; and maps without a drivable road."""
+"""Maps of an invented town in real formats, and maps without roads."""
 
 import math
 import re
@@ -10,7 +10,7 @@ TURNED_RAD = math.radians(23.0)
 
 
 def osm_town() -> str:
-    """An OpenStreetMap extract: crooked streets at 23° to the north, some with two lanes a way, signals, crossings."""
+    """Returns an OpenStreetMap extract: crooked streets at 23°, signals and crossings."""
     nodes, ways, number = [], [], 1000
     for i in range(SIDE):
         for j in range(SIDE):

@@ -1,4 +1,4 @@
-"""OpenDRIVE files written by hand, and an evaluation of their geometry that shares no code with the project's.
+"""Hand-written OpenDRIVE files, and an independent evaluation of their geometry.
 
 Spirals are Fresnel integrals, arcs circles, and cubics are integrated adaptively.
 """
@@ -47,7 +47,7 @@ def shape_at(shape: Shape, begin: Turned, ds: float) -> Turned:
 
 
 def lane_at(root: Element, road: str, lane: int, s: float) -> tuple[float, float, float]:
-    """x, y and direction of traffic of a lane's middle, read from the XML alone."""
+    """Returns x, y and traffic direction of a lane's middle, from XML."""
     element = next(e for e in root.findall("road") if e.get("id") == road)
     geometry = [g for g in element.iter("geometry") if float(g.get("s", 0)) <= s][-1]
     point, heading = shape_at(*_shape(geometry), s - float(geometry.get("s", 0)))
@@ -94,7 +94,7 @@ def _shape(geometry: Element) -> tuple[Shape, Turned]:
 
 
 class Lanes(NamedTuple):
-    """Lane section: its begin, and widths a, b, c, d and links of lanes."""
+    """Lane section: begin, and lanes' widths (a, b, c, d) and links."""
 
     start: float
     widths: Mapping[int, Sequence[float]]
@@ -113,7 +113,7 @@ def road_xml(
     offsets: Sequence[Sequence[float]] = (),
     kind: str = "",
 ) -> str:
-    """A road of shapes one after another; `links` is XML, `offsets` rows of s, a, b, c, d."""
+    """Makes a road of shapes; `offsets` rows: s, a, b, c, d."""
     geometry, s, at = "", 0.0, begin
     for shape in shapes:
         geometry += f'<geometry s="{s!r}" x="{at[0].real!r}" y="{at[0].imag!r}" hdg="{at[1]!r}" length="{shape[1]!r}">'

@@ -8,7 +8,7 @@ SCENARIO, VARIATION, BODIES, WAYS = "cut_in.xosc", "variation.xosc", "catalogs/b
 
 
 def copied(folder: Path, *changes: tuple[str, str, str]) -> Path:
-    """Copies the files into a folder, with changes: file, text and what is there in its place."""
+    """Copies the files into a folder, with changes: file, old, new text."""
     there = folder / "files"
     shutil.copytree(FILES, there)
     for file, old, new in changes:

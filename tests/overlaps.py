@@ -1,4 +1,4 @@
-"""Overlapping bodies in recorded series, for every test that has a failure at hand."""
+"""Overlapping bodies in recorded series, for tests that have a failure."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,12 +14,12 @@ from risk_sac.verdicts.validity import Overlap, overlaps_before_contact
 
 
 def overlaps_in(series: Mapping[str, NDArray[Any]]) -> list[Overlap]:
-    """The overlaps of a recorded episode, but for the two bodies that touch at its end."""
+    """Returns an episode's overlaps, except of the bodies that finally touch."""
     return overlaps_before_contact(Evidence.from_series(series, Ground(), float(series["released_s"])))
 
 
 def overlaps_before_valid_contacts(results: Path) -> dict[Path, list[Overlap]]:
-    """Series → its overlaps, where there are any; files that a test has damaged or taken away are left out."""
+    """Returns series → overlaps, if any; ignores files that tests have damaged."""
     try:
         contacts = [each for each in read_results(results).failures if each.episode.collision]
     except RiskSacError:

@@ -1,4 +1,4 @@
-"""A real PostgreSQL server of the tests' own, on a free loopback port and in a temporary folder."""
+"""PostgreSQL server on a free loopback port in a temporary folder."""
 
 import os
 import pwd
@@ -68,7 +68,7 @@ def binaries() -> Path | None:
 
 @contextmanager
 def running(bin_: Path) -> Iterator[PostgreSql]:
-    """Starts a server; as root under another user, since it refuses to run as root.
+    """Starts a server; as root under another user, as PostgreSQL requires.
 
     Its folder is none of pytest's, which are closed to other users.
     """

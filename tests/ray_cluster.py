@@ -1,4 +1,4 @@
-"""A Ray cluster of the tests' own: nodes that are processes of this machine, with a token, ended by their ids."""
+"""Ray cluster for the tests: local processes, with a token."""
 
 import contextlib
 import os
@@ -80,7 +80,7 @@ class Cluster:
             self.add(number)
 
     def add(self, number: int, prefix: Sequence[str] = (), **environment: str) -> None:
-        """Starts a node; 0 is the head. `ray start --block` stays beside what it started.
+        """Starts a node, 0 the head; `ray start --block` stays as parent.
 
         Args:
           number: of the node.
@@ -148,7 +148,7 @@ class Cluster:
         shutil.rmtree(self.temp, ignore_errors=True)
 
     def left(self) -> list[psutil.Process]:
-        """Processes of this cluster, its runs and their caretakers among them, by what they were started with."""
+        """Returns the cluster's remaining processes, runs included, found by its token."""
         mark, found = self.environment["RAY_AUTH_TOKEN"], []
         for process in psutil.process_iter():
             with contextlib.suppress(psutil.Error):

@@ -7,7 +7,7 @@ from typing import Any
 
 
 class Receiver:
-    """A local HTTP server that answers with the given statuses, then with 204."""
+    """Local HTTP server that answers with the given statuses, then 204."""
 
     def __init__(self, *statuses: int) -> None:
         self.messages: list[dict[str, Any]] = []

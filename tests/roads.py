@@ -14,7 +14,7 @@ LIMIT_MPS = 13.89
 def road(
     radius_m: float | None = None, *, left: bool = True, turn_rad: float = math.pi / 2, piece_m: float = 1.0
 ) -> Path:
-    """A path along x that turns after `STRAIGHT_M`; without a radius it goes straight on.
+    """Path along x that turns after `STRAIGHT_M`; straight without a radius.
 
     Args:
       radius_m: of the arc.

@@ -20,7 +20,7 @@ LONG_S = 600.0  # what has not happened by then never will, however busy the mac
 
 
 class Service:
-    """A server process of our own, on a free loopback port; it says what it has to say in `log`."""
+    """Server process on a free loopback port, with its output in `log`."""
 
     def __init__(
         self, data_dir: Path, worker_module: str, environment: Mapping[str, str], settings: Mapping[str, object]
@@ -101,7 +101,7 @@ class Service:
             cursor = {"cursor": page["next"]}
 
     def workers(self, campaign_id: str = "") -> list[int]:
-        """Processes that execute runs of this server's data folder, or of one campaign in it."""
+        """Returns processes that execute runs of this server, or of one campaign."""
         folder = f"{self.data_dir}/campaigns/{campaign_id}".encode()
         found = []
         for entry in Path("/proc").iterdir():
@@ -119,7 +119,7 @@ class Service:
 
 @contextlib.contextmanager
 def servers(folder: Path, **common: object) -> Iterator[Callable[..., Service]]:
-    """Starts servers, by default on one data folder and with the common settings, and stops them at the end."""
+    """Starts servers with the common settings, and stops them at the end."""
     services: list[Service] = []
 
     def start(

@@ -11,7 +11,7 @@ LAB = "risk_sac/lab/"  # training, benchmarks and measured figures: the product 
 
 
 def counts() -> Iterator[tuple[str, int, int]]:
-    """Yield what is counted, the count of the tracked files, and the limit."""
+    """Yields what is counted, its count in tracked files, and its limit."""
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     python = [name for name in tracked if name.endswith(".py") and GENERATED not in name and (ROOT / name).exists()]
     lab = [name for name in python if name.startswith(LAB)]

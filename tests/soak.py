@@ -1,4 +1,4 @@
-"""Many episodes of adversaries that each keep to a manoeuvre; run as a process, for libsumo may take it down.
+"""Plays many episodes of steady manoeuvres in a process of its own.
 
 python -m tests.soak FAMILY EPISODES; says by how much resident memory grew.
 """

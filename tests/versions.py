@@ -23,7 +23,7 @@ def ended_campaign(
     boundary: BoundaryMap | None = None,
     **changes: Any,
 ) -> EndedCampaign:
-    """Of one version of an ego, with one search and, given what it drew, one run of an i.i.d. phase.
+    """Campaign of an ego's version: a search, and perhaps an i.i.d. run.
 
     Args:
       version: the maker's.

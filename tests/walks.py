@@ -1,4 +1,4 @@
-"""Files that a real run goes through on three walks: `python -m tests.walks`.
+"""Files that a real run passes on three walks: `python -m tests.walks`.
 
 A service, its client and one worker play a campaign. An action's walk is the commonest one of all steps. Functions that
 numba compiled, and those of libraries, are not seen. `python -m tests.walks FOLDER ...` is that worker.
@@ -114,7 +114,7 @@ def work() -> None:
 
 
 def play(folder: Path) -> None:
-    """Post a campaign of one short run to a service, wait for its end and read its episodes."""
+    """Posts a campaign of one short run, awaits it, reads its episodes."""
     settings = ServiceSettings(data_dir=folder / "data", worker_module="tests.walks", replays=0, lease_s=60.0)
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
+"""Every setting of the system, as frozen pydantic models with documented fields."""
 
 from risk_sac.config.base import Interval, Settings, field_errors
 from risk_sac.config.campaign import Budget, CampaignSpec, FamilyName, Iid, JudgeConfig, RateStart, Requirement, RunSpec

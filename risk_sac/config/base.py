@@ -59,7 +59,7 @@ Weight = Annotated[float, Field(ge=0, le=1000)]
 
 
 def is_none(value: object) -> bool:
-    """Whether a setting is left out of what is written, so that digests of older specs hold."""
+    """Whether a setting is omitted when written, which keeps older specs' digests."""
     return value is None
 
 
@@ -119,7 +119,7 @@ def _place_of(error: Exception) -> str:
 
 
 def _parsed(text: str) -> Any:
-    """JSON by its own rules, since YAML takes no tabs and reads 1e-7 as a word."""
+    """Parses JSON or YAML; YAML refuses tabs and reads 1e-7 as text."""
     if text.lstrip().startswith("{"):
         try:
             return json.loads(text)
@@ -170,7 +170,7 @@ def field_errors(error: ValidationError, model: type[BaseModel]) -> ConfigError:
 
 
 def causes(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Drops errors that repeat one inside them: a list is "too short" once its bad entries are dropped."""
+    """Drops errors that contain others: a list without bad entries seems short."""
     locations = [item["loc"] for item in errors]
 
     def repeats(location: Location) -> bool:
@@ -180,7 +180,7 @@ def causes(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 
 def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -> ConfigError:
-    """Translates one of `ValidationError.errors()`; fields of `model` are listed where one is unknown."""
+    """Translates a pydantic error; lists fields of `model` where one is unknown."""
     location: Location = item["loc"]
     field = dotted(location)
     cause = item.get("ctx", {}).get("error")

@@ -68,7 +68,7 @@ Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")
 
 
 def _batch(given: object) -> object:
-    """Returns the number that `auto` means on this machine, and anything else as it is."""
+    """Returns the number that `auto` means here; anything else unchanged."""
     return min(AUTO_EACH * cores(), MOST_BATCH) if given == "auto" else given
 
 
@@ -128,7 +128,7 @@ class Budget(Settings):
 
 
 class Iid(Settings):
-    """Final phase that estimates the ego's failure rate in scenes that no search chose.
+    """Final phase that estimates the failure rate in scenes no search chose.
 
     They are drawn from the ODD independently, by the document's distributions and else uniformly. They are played with
     undisturbed traffic and with random adversaries, in runs of their own.
@@ -141,7 +141,7 @@ class Iid(Settings):
 
 
 class RateStart(Settings):
-    """Scenes that failed before a run of the method `rate`, where it looks first. No estimate counts them."""
+    """Failing scenes where a run of `rate` begins; no estimate counts them."""
 
     scenes: Annotated[tuple[Mapping[ParameterName, float], ...], Field(min_length=1, max_length=300)]
     """Each with a value of every parameter. Those beyond what the ODD leaves are not used."""
@@ -204,12 +204,12 @@ class RunSpec(Settings):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the canonical JSON; two runs with the same digest give the same results."""
+        """SHA-256 of the canonical JSON; the same digest means the same results."""
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
 
 
 def plain_url(text: str) -> str:
-    """Checks a URL: what parsers read differently, such as a user before the host, is refused."""
+    """Checks a URL; refuses parts that parsers read differently (user, backslash)."""
     try:
         parts = urlsplit(text)
         plain = text.isascii() and text.isprintable() and not set(text) & set(" \\@#") and parts.port != 0
@@ -300,11 +300,11 @@ class CampaignSpec(Settings):
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
 
     def runs(self) -> tuple[RunSpec, ...]:
-        """All runs in the order they are queued: the i.i.d. phase, if there is one, at the end."""
+        """Returns all runs in queue order: searches, then the i.i.d. phase."""
         return self.searches() + self.drawn()
 
     def searches(self) -> tuple[RunSpec, ...]:
-        """Families × methods × seeds: seeds outermost, so that early results compare methods."""
+        """Returns families × methods × seeds, seeds outermost: early results compare methods."""
         return tuple(
             RunSpec(
                 family=family,
@@ -321,7 +321,7 @@ class CampaignSpec(Settings):
         )
 
     def drawn(self) -> tuple[RunSpec, ...]:
-        """Of the i.i.d. phase: a run for each family and kind of traffic."""
+        """Returns the i.i.d. phase's runs, one per family and kind of traffic."""
         if self.iid is None:
             return ()
         budget = Budget(episodes=self.iid.episodes)
@@ -344,7 +344,7 @@ IN_CHECKPOINT = 3  # what lives, its copy, and the archive of it
 
 
 def check_demand(spec: RunSpec, observation_size: int, action_size: int, horizon_steps: int) -> None:
-    """Refuses a run that takes more than `MOST_BYTES`; the ConfigError names the field that takes most of it."""
+    """Refuses a run above `MOST_BYTES`; the ConfigError names the largest field."""
     demand = demand_bytes(spec, observation_size, action_size, horizon_steps)
     if (total := sum(demand.values())) > MOST_BYTES:
         field, most = max(demand.items(), key=lambda item: item[1])
@@ -357,7 +357,7 @@ def check_demand(spec: RunSpec, observation_size: int, action_size: int, horizon
 
 
 def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon_steps: int) -> dict[str, int]:
-    """Computes the memory at a run's fullest moment, by the field that asks for it.
+    """Computes a run's peak memory, by the field that asks for it.
 
     That is when a checkpoint is written at the run's end.
 

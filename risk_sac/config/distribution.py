@@ -35,14 +35,14 @@ class _Law(Settings, ABC):
 
     @abstractmethod
     def inverse(self, share: float) -> float:
-        """The least x with F(x) >= share, for a share in (0, 1)."""
+        """Returns the least x with F(x) >= share, share in (0, 1)."""
 
     def mass(self, low: float, high: float) -> float:
         """P(low <= X <= high)."""
         return self.cumulative(high) - self._below(low)
 
     def quantile(self, share: float, low: float, high: float) -> float:
-        """The value at a share in [0, 1] of the distribution truncated to [low, high].
+        """Returns the quantile at `share` in [0, 1], truncated to [low, high].
 
         x = F⁻¹(F(low) + share · (F(high) - F(low)))
 
@@ -54,7 +54,7 @@ class _Law(Settings, ABC):
 
     @property
     def usual_range(self) -> tuple[float, float]:
-        """All but a thousandth of it on either side: a range for a parameter that states none."""
+        """Returns the range that leaves out a thousandth on either side."""
         return self.inverse(TAIL), self.inverse(1.0 - TAIL)
 
     def _below(self, value: float) -> float:
@@ -227,7 +227,7 @@ class WeightsLaw(Settings):
         return WeightsLaw(kind="weights", weights=tuple(w for w, keep in zip(self.weights, which, strict=True) if keep))
 
     def index(self, share: float) -> int:
-        """Finds the word or row at a share in [0, 1] of all probability."""
+        """Returns the index at a share in [0, 1] of all probability."""
         left = share * math.fsum(self.weights)
         last = max(i for i, weight in enumerate(self.weights) if weight > 0.0)
         return next((i for i, sum_ in enumerate(accumulate(self.weights)) if sum_ > left), last)

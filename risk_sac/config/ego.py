@@ -1,4 +1,4 @@
-"""The vehicle under test: its driver and its sight, its sensors and actuators."""
+"""The vehicle under test: its driver, sight, sensors and actuators."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -39,7 +39,7 @@ class BodyErrors(Settings):
 
 
 class SensorErrors(Settings):
-    """Errors of sensors; the ego knows its own motion and the signals exactly."""
+    """Errors of sensors; the ego knows its own motion and signals exactly."""
 
     vehicles: BodyErrors = BodyErrors()
     pedestrians: BodyErrors = BodyErrors()
@@ -57,7 +57,7 @@ class SensorErrors(Settings):
 
 
 class ActuatorConfig(Settings):
-    """Delays and lags between a command and the car, and limits below the car's own."""
+    """Delays and lags from command to car, and limits below its own."""
 
     delay_s: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Dead time of acceleration and braking, s; a multiple of 0.1."""
@@ -125,7 +125,7 @@ T = TypeVar("T", SensorErrors, ActuatorConfig)
 
 
 def _reader(presets: Mapping[str, T], model: type[T]) -> Callable[[Any], Any]:
-    """Returns a validator that refuses a preset or an object in one line."""
+    """Returns a validator of presets or objects, with errors in one line."""
 
     def read(value: Any) -> Any:
         if not isinstance(value, dict | model) and (not isinstance(value, str) or value not in presets):
@@ -163,7 +163,7 @@ class SensorConfig(Settings):
 
 
 class EgoConfig(Settings):
-    """SUMO's default driver with a driver's delay and view, or a driver that the operator has registered.
+    """SUMO's default driver with delay and limited view, or a registered driver.
 
     The profile `perfect` reacts within one simulation step and sees everything; `careful` adds the braking of UN
     R157's driver, `defensive` what the reference driver of that name does. A registered driver takes over at the

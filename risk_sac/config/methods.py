@@ -1,4 +1,4 @@
-"""The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler; registered samplers.
+"""Methods as rows: agent × {lagrangian, shaping, replay} × scene sampler.
 
 Samplers are entry points of the group `risk_sac.samplers`, beside those that ship. Nothing of them is imported here.
 """
@@ -48,7 +48,7 @@ SamplerMethod = Annotated[str, Field(pattern=SAMPLER_PATTERN)]
 
 
 def _named(*methods: str) -> tuple[PlainValidator, WithJsonSchema]:
-    """Returns what validates and describes a method's name, so that an error lists the methods and no union."""
+    """Returns validator and schema of method names; errors list the methods."""
 
     def check(value: Any) -> Any:
         if isinstance(value, str) and (value in methods or re.fullmatch(SAMPLER_PATTERN, value)):
@@ -98,7 +98,7 @@ class Method(Settings):
 
     @property
     def in_rounds(self) -> bool:
-        """Says whether several processes can play its episodes; a peer's policy learns in the one that plays."""
+        """Whether several processes play its episodes; a peer's policy learns while playing."""
         return not self.agent.startswith("stress")
 
     @property
@@ -216,7 +216,7 @@ _ALL: Mapping[str, Method] = dict([*METHODS.items(), *IID_METHODS.items()])
 
 
 def method_of(name: RunMethod) -> Method:
-    """Returns the row of a run's method, of a search's or of an i.i.d. phase's."""
+    """Returns the row of a run's method, search or i.i.d. phase."""
     if name.startswith(SAMPLER):
         return SAMPLER_METHOD
     return _ALL[name]
@@ -251,7 +251,7 @@ def samplers() -> Mapping[str, EntryPoint]:
 
 
 def named_methods() -> tuple[str, ...]:
-    """Returns the methods that a campaign can name, those of registered samplers last."""
+    """Returns the methods that a campaign can name, registered samplers' last."""
     return (*METHODS, *(f"{SAMPLER}{name}" for name in sorted(samplers())))
 
 

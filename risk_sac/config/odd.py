@@ -1,4 +1,4 @@
-"""The operational design domain as a user writes it, after ISO 34503's three branches.
+"""Operational design domain as users write it, by ISO 34503's three branches.
 
 Every field may be left out: a family's default ODD fills it. What an ODD does to the search is in
 `risk_sac.scenario.odd`.
@@ -39,7 +39,7 @@ class Scenery(Settings):
 
 
 class Environment(Settings):
-    """Weather and light, as far as they act on an episode; the rules are in `risk_sac.scenario.limits`."""
+    """Weather and light that act on an episode: see `risk_sac.scenario.limits`."""
 
     friction: Interval | None = None
     """Tyre-road friction coefficient, in (0, 1.2]; each scene has one value of it."""

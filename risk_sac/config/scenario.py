@@ -1,4 +1,4 @@
-"""Scenario document: roads, parameters, actors and constraints of a scenario, as a user writes them.
+"""Scenario document: roads, parameters, actors and constraints, as users write them.
 
 A document says nothing of lengths, limits, signals or ground: these are the net's. `risk_sac.scenario.interpret` makes
 layouts of it.
@@ -42,7 +42,7 @@ Route = Annotated[tuple[NetName, ...], Field(min_length=1, max_length=200)]
 
 
 class ScenarioParameter(Settings):
-    """An axis of the scene space, or a constant: one of `range`, `words`, `rows` and `value`."""
+    """Axis of the scene space, or constant: `range`, `words`, `rows` or `value`."""
 
     unit: Annotated[str, Field(max_length=20)] = "1"
     meaning: Annotated[str, Field(max_length=200)] = ""
@@ -94,7 +94,7 @@ class ScenarioParameter(Settings):
         return len(self.words or self.rows or ())
 
     def law(self, low: float, high: float) -> NumberLaw:
-        """Its distribution over its axis; of words and rows that is from 0 to 1.
+        """Returns the distribution over the axis (0 to 1 for words, rows).
 
         Args:
           low: where its axis begins, in a scene space that may be narrower than its range.
@@ -114,7 +114,7 @@ class ScenarioParameter(Settings):
         return tuple(self.rows[0]) if self.rows else ()
 
     def words_of(self, name: str) -> tuple[str, ...]:
-        """Returns the words that a name may have: its own, or those of its rows."""
+        """Returns the words of a name: its own, or those of rows."""
         if self.rows is None:
             return self.words or ()
         return tuple(dict.fromkeys(word for row in self.rows if isinstance(word := row.get(name), str)))
@@ -250,7 +250,7 @@ class Actor(Moving):
 
 
 class Stream(Driven):
-    """Background traffic on a lane, with equal gaps and clear of other actors."""
+    """Background traffic on a lane: equal gaps, clear of other actors."""
 
     lane: Lane | Chosen[tuple[NetName, ...]] | Annotated[tuple[NetName, ...], Field(min_length=1)]
     """Lane, or several, which the vehicles take in turns."""
@@ -356,7 +356,7 @@ class Scenario(Settings):
 
     @property
     def choices(self) -> Iterator[tuple[str, "Chosen[Any]"]]:
-        """All values that a parameter's word chooses, each with its path in the document."""
+        """Yields the values that a parameter's word chooses, each with its path."""
         return ((path, value) for path, _, value in _leaves("", self) if isinstance(value, Chosen))
 
     @property
@@ -418,7 +418,7 @@ class Scenario(Settings):
 
 
 def _leaves(path: str, within: Settings) -> Iterator[tuple[str, FieldInfo, Any]]:
-    """Yields the fields of nested settings that hold a plain value, each with its path."""
+    """Yields the plain values of nested settings, with path and field."""
     for name, field in type(within).model_fields.items():
         here, value = f"{path}.{name}".removeprefix("."), getattr(within, name)
         for key, part in _parts(value):
@@ -429,7 +429,7 @@ def _leaves(path: str, within: Settings) -> Iterator[tuple[str, FieldInfo, Any]]
 
 
 def _parts(value: Any) -> Iterator[tuple[str, Any]]:
-    """Yields the members of nested mappings and tuples of settings, each with its path."""
+    """Yields members of nested mappings and tuples of settings, with their paths."""
     if isinstance(value, Mapping):
         for key, member in value.items():
             yield from ((f".{key}{inner}", part) for inner, part in _parts(member))

@@ -1,4 +1,4 @@
-"""Settings of runs and campaigns from YAML and command-line flags, checked as strictly as a REST body."""
+"""Settings from YAML and command-line flags, checked as strictly as REST bodies."""
 
 import json
 import re
@@ -41,14 +41,14 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
 
 
 def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
-    """Returns the campaign described by a YAML file, overridden by flags as `read_spec` has them, else by defaults."""
+    """Returns the campaign of a YAML file, overridden by flags, over defaults."""
     given = {name: value for name, value in flags.items() if value is not None}
     data = _placed({} if file is None else with_scenarios(read_fields(file, "spec")), given)
     return _validate(CampaignSpec, {**defaults, **data, **given})
 
 
 def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | dict[str, Any]:
-    """Returns a campaign to post; one on an uploaded network as fields, which the service checks."""
+    """Returns a campaign to post, or unchecked fields for an uploaded network."""
     given = {name: value for name, value in flags.items() if value is not None}
     data = _placed({} if file is None else with_scenarios(read_fields(file, "spec")), given) | given
     return data if "network" in data else _validate(CampaignSpec, data)
@@ -92,14 +92,14 @@ def campaign_yaml(spec: CampaignSpec) -> str:
 
 
 def _placed(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """Moves the budget's fields and the behaviour from the flags to where a spec has them."""
+    """Moves budget and behaviour from the flags to their places in specs."""
     budget = {name: given.pop(name) for name in Budget.model_fields if name in given}
     data = _with(data, ("budget",), budget)
     return _with(data, ("odd", "dynamic"), {"behaviour": given.pop("behaviour")}) if "behaviour" in given else data
 
 
 def with_scenarios(data: dict[str, Any]) -> dict[str, Any]:
-    """Returns the fields of a spec with `scenario` and `scenarios` under the names that records have for them."""
+    """Renames `scenario` and `scenarios` to the fields that records have."""
     for name, field in SCENARIOS.items():
         if name in data:
             if field in data:
@@ -140,7 +140,7 @@ def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:
 
 
 def _validate(model: type[T], data: dict[str, Any]) -> T:
-    """Through JSON, because strictness would refuse YAML's lists where a tuple is wanted."""
+    """Validates through JSON, since strictness refuses YAML's lists for tuples."""
     try:
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Story of a scenario document: what its actors do besides the search, and when.
+"""Story of a scenario document: what its actors do, and when.
 
 The model follows OpenSCENARIO XML 1.3. A story has acts, an act has maneuver groups, a group has maneuvers, a maneuver
 has events, and an event has actions and a start trigger. Values are arithmetic over the document's parameters.
@@ -147,7 +147,7 @@ class AngleCondition(_EntityCondition):
 
 
 class OffroadCondition(_EntityCondition):
-    """Holds once an actor was off the road, or at its end, so long, s."""
+    """Holds after `duration_s` off the road, or at its end."""
 
     kind: Literal["offroad", "end_of_road"]
     duration_s: Expression
@@ -251,7 +251,7 @@ class InitAction(Settings):
 
 
 class DeviationBounds(Settings):
-    """Bounds of what a search adds to a story; with zeros it is followed exactly."""
+    """Bounds of what a search adds to a story; zeros change nothing."""
 
     accel_mps2: Annotated[float, Field(ge=0, le=10)] = 1.5
     """Added to the acceleration."""

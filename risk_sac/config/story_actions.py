@@ -1,4 +1,4 @@
-"""Places and actions of a story: positions, routes, trajectories, and what moves an actor or sets a variable.
+"""Places and actions of a story: positions, routes, trajectories, motions and variables.
 
 Positions are those of OpenSCENARIO XML; values are arithmetic over the document's parameters.
 Source: ASAM OpenSCENARIO XML 1.3, class reference.
@@ -80,7 +80,7 @@ class RelativeRoadPosition(_Turned):
 
 
 class RelativePosition(_Turned):
-    """Point given by an actor's axes, or by the world's axes through an actor."""
+    """Point in an actor's axes, or in the world's axes through it."""
 
     kind: Literal["relative"]
     to: ActorName
@@ -162,7 +162,7 @@ class ClothoidSegment(Settings):
 
 
 class ClothoidSpline(Settings):
-    """Trajectory of clothoids; a single clothoid, an arc and a line are such."""
+    """Trajectory of clothoids, of which arcs and lines are special cases."""
 
     kind: Literal["clothoids"]
     segments: Annotated[tuple[ClothoidSegment, ...], Field(min_length=1, max_length=1000)]
@@ -203,7 +203,7 @@ class SpeedAction(Settings):
 
 
 class SpeedEntry(Settings):
-    """Speed of a profile, and how long it takes from the entry before."""
+    """Speed of a profile, and the time to reach it."""
 
     speed: Expression
     """m/s."""
@@ -280,7 +280,7 @@ class DistanceAction(Settings):
 
 
 class FinalSpeed(Settings):
-    """Speed at the target of a synchronisation, and how long before it is kept."""
+    """Speed at a synchronisation's target, and how long it is kept before."""
 
     speed: Expression | RelativeTarget
     steady_m: Expression | None = None
@@ -308,7 +308,7 @@ class TrajectoryTiming(Settings):
 
 
 class FollowTrajectoryAction(Settings):
-    """Follows a trajectory, at its own speed or at the times of its points."""
+    """Follows a trajectory at the actor's speed or at its points' times."""
 
     kind: Literal["follow_trajectory"]
     trajectory: AnyName

@@ -90,7 +90,7 @@ class Term:
     depth: int = 1
 
     def value(self, of: Mapping[str, float]) -> float:
-        """The value, given those of the names; raises `ConfigError` where it has none."""
+        """Returns the value for given names; raises `ConfigError` if undefined."""
         if self.op == "number":
             return self.number
         if self.op == "name":
@@ -111,7 +111,7 @@ class Term:
         return {self.name} if self.op == "name" else set().union(*(child.names() for child in self.children))
 
     def range(self, of: Mapping[str, Interval]) -> Interval:
-        """Bounds of the value over the ranges of the names, by interval arithmetic; they may be too wide.
+        """Returns bounds of the value by interval arithmetic, possibly too wide.
 
         Raises:
           ConfigError: the value does not exist somewhere within the ranges, such as at a division by zero.
@@ -206,7 +206,7 @@ def _parsed(text: str, start: str, kind: str, expected: str) -> Term:
 
 @cache
 def term(expression: "float | str") -> Term:
-    """Parses an expression, or takes a number; raises `ConfigError` for anything but arithmetic."""
+    """Parses an expression or wraps a number; `ConfigError` unless arithmetic."""
     if isinstance(expression, str):
         wanted = f"arithmetic over parameters: + - * / % and {', '.join(FUNCTIONS)}"
         return _parsed(expression, "start", "arithmetic", wanted)
@@ -215,7 +215,7 @@ def term(expression: "float | str") -> Term:
 
 @cache
 def comparison(text: str) -> Term:
-    """Parses a comparison of two expressions, which is 1 or 0; raises `ConfigError`."""
+    """Parses a comparison, of value 1 or 0; raises `ConfigError` for others."""
     return _parsed(text, "comparison", "comparison", "a comparison such as `lead_gap_m >= 2 * ego_speed_mps`")
 
 

@@ -1,4 +1,4 @@
-"""Executes runs and writes them down: one in this process, or a campaign's in processes of their own."""
+"""Execution of runs and their records, in this or in separate processes."""
 
 from typing import TYPE_CHECKING, Literal, get_args
 

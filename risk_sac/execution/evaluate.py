@@ -78,7 +78,7 @@ class Watcher:
 
 @contextmanager
 def stop_signal(numbers: Sequence[signal.Signals] = STOPPING) -> Iterator[Callable[[], bool]]:
-    """Turns the first of the signals into an answer; a second one acts as always."""
+    """Yields whether a signal came, as a function; a second acts normally."""
     stopping = False
 
     def stop(number: int, frame: FrameType | None) -> None:
@@ -155,7 +155,7 @@ def verify(
 def _replayed(
     folders: Sequence[Path], times: int, jobs: int, stopping: Callable[[], bool]
 ) -> Mapping[Path, Sequence[Collection[int]]]:
-    """By run, the failures that were the same, for each process that has replayed it to the end."""
+    """Replays failures; returns, by run, those that each finished process reproduced."""
     arguments = [ANSWER, str(times), str(jobs), *map(str, folders)]
     result = run_helper("risk_sac.failures.play", arguments, wall_s=math.inf, stopping=stopping)
     if result.status != 0:
@@ -188,7 +188,7 @@ def evaluate(
     executor: str = "local",
     times: int = TIMES,
 ) -> Evaluation:
-    """Executes what is not finished yet and writes the report of what is.
+    """Executes the unfinished runs and writes the report of finished ones.
 
     SIGINT, SIGTERM or SIGHUP stop it: the runs save a checkpoint, and the same call goes on with them.
 
@@ -229,7 +229,7 @@ def evaluate(
 
 @contextmanager
 def _claimed(spec: CampaignSpec, folder: Path) -> Iterator[None]:
-    """Holds the folder for this campaign; should this process be killed, its workers leave at once."""
+    """Locks the folder for this campaign; workers leave if this process dies."""
     with held(folder):
         file = folder / SPEC
         if file.exists():

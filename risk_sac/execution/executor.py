@@ -29,7 +29,7 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Exited:
-    """The last message about an attempt: its worker is gone. `reason` says why, unless it ended in order."""
+    """Last message of an attempt; `reason` is None after an orderly end."""
 
     reason: str | None
     cause: Cause = Cause.ENDED
@@ -73,7 +73,7 @@ class ClusterNode:
 
     @property
     def silent_s(self) -> float:
-        """Time since the last report of any of its runs; 0 without any."""
+        """Time since the last report of any run; 0 without runs."""
         return min(self.silences.values(), default=0.0)
 
 
@@ -96,26 +96,26 @@ class Executor(Protocol):
     """
 
     def submit(self, number: int, spec: RunSpec, folder: Path, slots: int) -> None:
-        """Starts a run, whose files go to `folder`, with at most `slots` processes that play its episodes.
+        """Starts a run in `folder`, with at most `slots` rollout processes.
 
         Raises:
           OSError: it cannot be started.
         """
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
-        """Returns messages since the last call, by run, waiting up to `timeout_s` for one.
+        """Returns messages since the last call, by run; waits up to `timeout_s`.
 
         The last message of each run is `Exited`.
         """
 
     def cancel(self, number: int, grace_s: float) -> None:
-        """Asks a run to stop, and kills it after `grace_s`; ignores unknown runs.
+        """Asks a run to stop, kills it after `grace_s`; ignores unknown runs.
 
         Of several calls the earliest deadline counts.
         """
 
     def silent_s(self, number: int) -> float | None:
-        """Returns the time since the last sign of life of a run's worker; None without a worker."""
+        """Returns the time since the worker's last sign of life, else None."""
 
     def wake(self) -> None:
         """Lets a waiting `events` return early."""
@@ -137,7 +137,7 @@ Messages = queue.SimpleQueue[tuple[int, Event | Exited] | None]
 
 
 def taken(messages: Messages, timeout_s: float) -> list[tuple[int, Event | Exited]]:
-    """Takes all messages out of a queue, waiting up to `timeout_s` for one."""
+    """Empties a queue of messages, waiting up to `timeout_s` for one."""
     batch = []
     with contextlib.suppress(queue.Empty):
         message = messages.get(timeout=timeout_s)

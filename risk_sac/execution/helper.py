@@ -73,7 +73,7 @@ def run_helper(
     log: Path | None = None,
     stopping: Callable[[], bool] = lambda: False,
 ) -> HelperResult:
-    """Runs a Python program in a process of its own and waits for its end.
+    """Runs a Python program in its own process and waits for it.
 
     Args:
       program: name of a module, or path of a `.py` file.
@@ -119,7 +119,7 @@ def run_helper(
 
 
 def _waited(process: subprocess.Popen[bytes], deadline: float, stopping: Callable[[], bool]) -> bool:
-    """Waits for the process and kills its whole session; returns whether the time was over."""
+    """Waits for a process, kills its session; returns whether it timed out."""
     stopped_s = 0.0
     try:
         while not stopping():

@@ -1,4 +1,4 @@
-"""The runs of a campaign without a server, kept in memory and in their folders."""
+"""Runs of a campaign without a server, in memory and in folders."""
 
 import math
 import time
@@ -85,7 +85,7 @@ class JobStore:
         return QueuedRun(number=number, spec=job.spec, folder=job.folder, slots=use.granted(job.spec))
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
-        """See `RunStore`; what is wrong with a run's folder leaves the others alone."""
+        """See `RunStore`; a faulty run folder does not affect other runs."""
         job = self._jobs[run.number]
         job.state, job.reason = "failed", str(error)
 
@@ -129,7 +129,7 @@ def execute(
     progress: JobProgress,
     stopping: Callable[[], bool],
 ) -> None:
-    """Keeps jobs at work on so many slots until each has finished or failed; no worker outlives it."""
+    """Executes jobs on `at_once` slots until all ended; no worker outlives it."""
     for job in jobs:
         job.look()
     store = JobStore(jobs)

@@ -79,11 +79,11 @@ class Subprocess:
 
     @property
     def status(self) -> int | None:
-        """Of its exit, negative for a signal; None as long as it is there."""
+        """Returns the exit status, negative for a signal; None while running."""
         return self._process.poll()
 
     def lines(self, timeout_s: float) -> list[bytes]:
-        """Reads lines, waiting up to `timeout_s` for one, or for its end if it says no more.
+        """Reads lines, or awaits the exit after the last, up to `timeout_s`.
 
         A line longer than `LONGEST_LINE` comes in pieces, and what its end cuts off is no line.
         """
@@ -157,7 +157,7 @@ class Signs:
 
 
 class Lease:
-    """Limits how long a worker may be silent, or busy without a result.
+    """Limit on how long a worker is silent, or busy without result.
 
     A worker sends heartbeats. One whose interpreter is held up, by a long compilation say, cannot, but it uses its
     processor; one that was stopped does neither. Only time during which this process watched counts.
@@ -251,7 +251,7 @@ class LocalExecutor:
 
 
 class _Worker:
-    """An attempt and its executor's patience with it; but for `stop` and `kill` it belongs to one thread."""
+    """Attempt and its lease; one thread calls all but `stop` and `kill`."""
 
     def __init__(self, program: WorkerProgram, process: Subprocess) -> None:
         self.process = process
@@ -276,7 +276,7 @@ class _Worker:
             self.process.terminate()
 
     def words(self, timeout_s: float) -> list[Event]:
-        """Reads its words up to the last, waiting up to `timeout_s` for one."""
+        """Reads messages up to the last, waiting up to `timeout_s` for one."""
         words = []
         for line in self.process.lines(timeout_s):
             try:

@@ -159,7 +159,7 @@ def reason_of(status: int, log: WorkerLog) -> str | None:
 
 
 def without_folders(text: str, own: Path | None = None) -> str:
-    """Removes the folders from all paths in a text, so that any user may read it.
+    """Removes the folders from all paths in a text.
 
     Args:
       text: as it was meant for the log.

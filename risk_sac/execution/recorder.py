@@ -33,7 +33,7 @@ REWRITTEN = 0.1  # share of new episodes from which results.json is written agai
 
 
 class Recorder:
-    """Observer that writes the results of a run to its folder, then informs another observer.
+    """Observer that writes a run's results to its folder, then passes on.
 
     The run itself writes its episodes.
 
@@ -68,7 +68,7 @@ class Recorder:
         self._observer.episode(record, metrics, series)
 
     def finish(self, summary: RunOutcome) -> RunResults:
-        """Writes the results of the run, whose last checkpoint has its episodes on the disk."""
+        """Writes the run's results; the last checkpoint has stored its episodes."""
         results = replace(
             self.results,
             finished=summary.finished,
@@ -96,7 +96,7 @@ class Recorder:
         return results
 
     def _failures(self) -> Iterator[RecordedFailure]:
-        """Reads the failures so far from the run's episodes, since memory that held them would grow."""
+        """Reads the failures from the episodes, since in memory they would grow."""
         if not self._failed:
             return
         failed = frozenset(self._failed)

@@ -47,7 +47,7 @@ class SlotUse:
     most: float  # that one run may take
 
     def granted(self, spec: RunSpec, project: str = "", waiting: Collection[str] = ("",)) -> int:
-        """Returns how many of the free slots a run takes, at least one.
+        """Returns how many free slots a run takes, at least one.
 
         It takes all that it can use, but no more than its project's share: the projects with runs that wait or are at
         work share alike.
@@ -66,19 +66,19 @@ class SlotUse:
 
 
 class RunStore(Protocol):
-    """Keeps runs; called by the thread that calls the scheduler. Only `start_next` may raise."""
+    """Store of runs, called in the scheduler's thread; only `start_next` may raise."""
 
     def start_next(self, use: SlotUse) -> QueuedRun | None:
-        """Takes the next run that waits, grants it slots, and notes its start."""
+        """Takes the next waiting run, grants it slots, and notes its start."""
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """Its worker could not be started."""
 
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
-        """Keeps episodes, which a resumed run tells again; returns the numbers of runs to which one was new."""
+        """Stores episodes, even repeated ones; returns runs that had a new one."""
 
     def ended(self, run: QueuedRun, state: State, reason: str | None = None, result: Finished | None = None) -> None:
-        """It has succeeded, with a result, has failed, for a reason, or was cancelled; its worker has left."""
+        """Stores the end of a run: a result, a reason, or cancelled."""
 
     def requeued(self, run: QueuedRun, reason: str | None) -> None:
         """Notes that it waits again.
@@ -130,7 +130,7 @@ class Scheduler:
         self._deaths: Counter[int] = Counter()
 
     def fill(self, most: float) -> None:
-        """Starts waiting runs until they have taken `most` slots, or as many as the executor has room for."""
+        """Starts waiting runs until `most` slots, or all of them, are taken."""
         while True:
             taken = Counter[str]()
             for active in self.active.values():
@@ -161,7 +161,7 @@ class Scheduler:
         return heard
 
     def take_in(self, heard: Sequence[tuple[int, Event | Exited]]) -> None:
-        """Acts on messages in their order, on episodes that come one after the other at once."""
+        """Acts on messages in order, storing consecutive episodes in one batch."""
         episodes: list[tuple[int, EpisodeDone]] = []
         for number, message in heard:
             if isinstance(message, EpisodeDone):
@@ -192,7 +192,7 @@ class Scheduler:
             self._executor.cancel(number, grace_s)
 
     def abandon(self, grace_s: float) -> None:
-        """Stops the runs at work and ignores their ends; their store decides their state."""
+        """Stops the runs at work and leaves their states to the store."""
         for number, active in self.active.items():
             active.abandoned = True
             self._executor.cancel(number, grace_s)
@@ -203,7 +203,7 @@ class Scheduler:
             self._deaths.pop(number, None)
 
     def _end(self, active: Active, exited: Exited) -> None:
-        """Stores a run's end; the worker's last message goes before its exit status."""
+        """Stores a run's end; the worker's last message outweighs its exit status."""
         run, last = active.run, active.last
         if active.abandoned:
             return
@@ -225,7 +225,7 @@ class Scheduler:
             self._replace(run, exited)
 
     def _replace(self, run: QueuedRun, exited: Exited) -> None:
-        """A worker was lost: another one goes on from the checkpoint, unless that has failed too often."""
+        """Requeues a run that lost its worker, or fails it after `attempts`."""
         reason = exited.reason or "worker stopped before its run was done"
         self._deaths[run.number] += exited.cause is not Cause.LOST  # which is nothing that the run has done
         self.restarts[exited.cause] += 1

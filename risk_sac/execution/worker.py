@@ -82,7 +82,7 @@ class Reporter:
         return self.stopping
 
     def keep_going(self) -> None:
-        """From now on SIGTERM is a wish to stop, and no end; for the main thread to say."""
+        """Makes SIGTERM a wish to stop; for the main thread to call."""
         signal.signal(signal.SIGTERM, self._stop)
 
     def _stop(self, signal_number: int, frame: FrameType | None) -> None:
@@ -117,7 +117,7 @@ class Reporter:
 
 
 class LossyLog(io.FileIO):
-    """A log that a full disk leaves incomplete, but never ends the run."""
+    """Log that a full disk leaves incomplete, without ending the run."""
 
     def write(self, data: "ReadableBuffer", /) -> int:
         """Bytes written, or given up."""
@@ -213,7 +213,7 @@ def _lose_what_a_full_disk_refuses() -> None:
 
 
 def take_over(folder: Path) -> IO[bytes]:
-    """Locks a run's folder for this worker; close the returned file to give it back.
+    """Locks a run's folder for this worker; closing the returned file unlocks.
 
     A worker that still holds it has lost its scheduler, since one scheduler at a time starts workers here. It is given
     some time, then it is killed.
@@ -238,7 +238,7 @@ def take_over(folder: Path) -> IO[bytes]:
 
 
 def _kill_others() -> None:
-    """Kills processes that were started as this one was, with the same module and folder."""
+    """Kills processes that were started with the same module and folder."""
     own = psutil.Process()
     started_as = slice(1, 4)  # -m MODULE FOLDER
     for other in psutil.process_iter(["cmdline"]):

@@ -1,4 +1,4 @@
-"""For an assessor: test cases of a campaign, the inputs of its report, and coverage."""
+"""Records for an assessor: a campaign's test cases, report inputs and coverage."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -133,7 +133,7 @@ class FigureNote(Record):
 
 
 class ClauseRow(Record):
-    """A field of a test case, and the clause of a standard for it."""
+    """Field of a test case, and a standard's clause for it."""
 
     field: str
     standard: str

@@ -10,13 +10,13 @@ from risk_sac.world.documented import Documented
 
 
 def _without_defaults(schema: dict[str, Any]) -> None:
-    """Drops defaults from a schema: they are for what was stored before there was the field."""
+    """Drops defaults from a schema: they are for records of older versions."""
     for each in schema.get("properties", {}).values():
         each.pop("default", None)
 
 
 class Record(Documented):
-    """A frozen model that is stored as JSON, answered by the service and read by its client.
+    """Frozen model, stored as JSON, answered by the service, read by clients.
 
     Stored JSON, in a run's folder and in the database, has a non-finite number as the string "Infinity", "-Infinity" or
     "NaN". So it reads back. `wire` writes null instead.
@@ -36,7 +36,7 @@ def stored(value: object) -> str:
 
 
 def wire(record: BaseModel) -> bytes:
-    """JSON as the service answers it: a number that is not finite is null."""
+    """Returns JSON as the service answers, with null for non-finite numbers."""
     return to_json(record.model_dump(), inf_nan_mode="null")
 
 

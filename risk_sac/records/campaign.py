@@ -1,4 +1,4 @@
-"""Campaigns and scenarios as the API returns them: state, progress, results and power.
+"""Campaigns and scenarios in the API: state, progress, results and power.
 
 Power comes from benchmark runs, and says what finding nothing is worth.
 """
@@ -62,7 +62,7 @@ class MethodPower(Record):
 
 
 class Power(Record):
-    """Number of known defects that a campaign's budget detects, by stored benchmark runs.
+    """Number of known defects that a budget detects, by stored benchmark runs.
 
     Nothing is run for it.
     """
@@ -122,7 +122,7 @@ class Progress(Record):
 
 
 class EgoDriver(Record):
-    """The ego's driver. No enums, so that campaigns of earlier versions can be listed."""
+    """The ego's driver; no enums, so that earlier versions' campaigns load."""
 
     profile: str
     car_following: str
@@ -178,7 +178,7 @@ class EndNotice(Record):
 
 
 class Campaign(CampaignSummary):
-    """A campaign with its runs, in the order they are queued, and what was posted."""
+    """Campaign with its runs, in queue order, and what was posted."""
 
     runs: list[Run]
     requirements: Mapping[str, RequirementCounts] = {}
@@ -198,7 +198,7 @@ class CampaignCheck(Record):
 
 
 class StateChange(Record):
-    """A change of state of a campaign, or of one of its runs."""
+    """Change of state of a campaign or of one of its runs."""
 
     run_id: str | None
     """Null: the campaign itself."""
@@ -214,7 +214,7 @@ class StateChange(Record):
 
 
 class Total(Counts):
-    """All runs of one family and method that have begun: sums of counts, means of other figures."""
+    """Begun runs of one family and method: sums of counts, means otherwise."""
 
     family: Family
     method: SearchMethod
@@ -341,7 +341,7 @@ class ScenarioDetails(ScenarioSummary):
 
 
 def summary_of(name: str, document: Scenario, created_at: datetime | None = None) -> ScenarioSummary:
-    """Returns a scenario as lists show it; it ships unless it has a time."""
+    """Returns a scenario as lists show it; shipped if without a time."""
     return ScenarioSummary(
         name=name,
         shipped=created_at is None,

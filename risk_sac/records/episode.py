@@ -1,4 +1,4 @@
-"""One episode: how it ended, which requirements it violated, and how people triaged it."""
+"""Episode: how it ended, what it violated, and how people triaged it."""
 
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -60,7 +60,7 @@ class StoryDeviation(Record):
 
 
 class EpisodeRecord(Record):
-    """One episode as stored, streamed and counted. Plain values only, so it is JSON as it stands."""
+    """Episode as stored, streamed and counted; plain values, for JSON."""
 
     index: int
     """0-based within the run, rejected scenes included."""
@@ -121,7 +121,7 @@ class EpisodeRecord(Record):
 
     @property
     def worst_violation(self) -> Collision | Violation | None:
-        """The violation that names the episode: see `worst_of`; without a valid one the contact, or the first."""
+        """Violation that names the episode: `worst_of`, else contact, else first."""
         return worst_of(self.valid_violations) or self.collision or next(iter(self.violations), None)
 
     def refused_by(self, rule: str) -> tuple[str, ...]:
@@ -135,7 +135,7 @@ class EpisodeRecord(Record):
 
     @property
     def searching(self) -> bool:
-        """Whether it belongs to the search, and not to the evaluation of the frozen policy."""
+        """Whether it belongs to the search, not to the policy's evaluation."""
         return self.phase == "search"
 
     @property
@@ -147,7 +147,7 @@ class EpisodeRecord(Record):
         return self.phase == "evaluation"
 
     def refused(self, rule: str, requirements: Collection[str]) -> "EpisodeRecord":
-        """The same episode, whose valid violations of these requirements fail one more rule."""
+        """Returns a copy whose valid violations of these requirements fail `rule`."""
         if not any(each.requirement in requirements for each in self.valid_violations):
             return self
         ungraded: dict[str, Any] = {"grade": None, "drivers": {}}  # drivers are asked of what is valid alone
@@ -222,7 +222,7 @@ FailureOrder = Literal["arrival", "weight"]
 
 
 class EpisodePage(Page[Episode]):
-    """Episodes, in the order of their arrival unless another one was asked for."""
+    """Episodes, in order of arrival unless another order was asked for."""
 
 
 class TriageState(StrEnum):

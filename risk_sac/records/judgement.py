@@ -1,4 +1,4 @@
-"""Judgement of a contact: its origin, the ego's part and the verdict; plausibility of a failure."""
+"""Judgement of a contact: origin, ego's part, verdict; plausibility of failures."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -70,7 +70,7 @@ class ConflictType(StrEnum):
 
 
 class Grade(StrEnum):
-    """Whether a reference driver would have prevented a valid failure; PCR counts `PREVENTABLE`."""
+    """Whether a reference driver prevents a valid failure; PCR counts `PREVENTABLE`."""
 
     PREVENTABLE = "preventable"  # by at least one of the drivers that `judge.drivers` of the spec names
     FULL_BRAKING = "full_braking"  # only by full braking at once
@@ -115,7 +115,7 @@ class ReferenceOutcome(Record):
 
 
 class EgoPart(Record):
-    """The ego's reaction to the striker: facts from the frames up to the contact."""
+    """The ego's reaction to the striker: facts from frames up to contact."""
 
     seen_s: Real
     """How long it had seen the striker without a break."""
@@ -139,17 +139,17 @@ class EgoPart(Record):
 
     @property
     def sped_up(self) -> bool:
-        """Whether it gained speed, 1 m/s or more, though it saw the striker."""
+        """Whether it gained 1 m/s or more though it saw the striker."""
         return self.gained_mps >= GAINS_MPS
 
     @property
     def too_fast(self) -> bool:
-        """Whether it was faster than its sight allowed by more than 10 %."""
+        """Whether it was over 10 % faster than its sight allowed."""
         return self.sight_mps is not None and (self.sighted_mps or 0.0) > TOO_FAST * self.sight_mps
 
     @property
     def in_words(self) -> str:
-        """Such as "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²"; it follows "the ego"."""
+        """Describes the reaction, after "the ego": "braked 1.1 s after …"."""
         told = [self._braked]
         gained = f"gained {self.gained_mps:.1f} m/s" if self.sped_up else ""
         if self.started or self.sped_up:
@@ -175,7 +175,7 @@ Harm = Literal["death", "serious injury"]
 
 
 class Judgement(Record):
-    """Origin of a contact, and the reference drivers that would have prevented it.
+    """Origin of a contact, and reference drivers that would have prevented it.
 
     Times count from the release.
     """

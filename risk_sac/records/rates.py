@@ -105,7 +105,7 @@ class BoundaryPoint(Record):
 
 
 class BoxShare(Record):
-    """A share of the box that the axes span, with its 95 % interval from posterior samples."""
+    """Share of the axes' box; 95 % interval from posterior samples."""
 
     share: float
     low: float

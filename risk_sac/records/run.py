@@ -59,12 +59,12 @@ class Counts(Record):
 
     @property
     def rated(self) -> int:
-        """Episodes that rates are taken over: all, but for those in which the ego failed to drive."""
+        """Episodes in rates: all but those where the ego failed to drive."""
         return self.episodes - self.invalid
 
 
 class RequirementCounts(Record):
-    """The funnel of one requirement: violated → valid, in episodes, → distinct → preventable, in kinds."""
+    """A requirement's funnel: violated → valid episodes → distinct → preventable kinds."""
 
     counts: str
     """failure | report"""
@@ -90,7 +90,7 @@ class RequirementCounts(Record):
 
 
 class DriverPcr(Record):
-    """Valid contacts that one reference driver prevents, and their share of all episodes."""
+    """Valid contacts that a reference driver prevents, and share of all episodes."""
 
     prevented: int
     pcr: Real
@@ -100,7 +100,7 @@ class DriverPcr(Record):
 
 
 class RunMetrics(Counts):
-    """Measures of a run so far; rates come with their 95 % interval."""
+    """Measures of a run so far, rates with their 95 % interval."""
 
     # Fields with a default can be read from what was stored before they were counted.
 
@@ -206,7 +206,7 @@ Method = Annotated[str, WithJsonSchema(TypeAdapter(RunMethod).json_schema())]
 
 
 class RunSummary(Record):
-    """One (family, method, seed) of a campaign, or of its i.i.d. phase, whose methods begin with `iid-`."""
+    """Run of a campaign, or of its i.i.d. phase (methods `iid-`)."""
 
     id: str
     """Unique within the campaign."""

@@ -60,7 +60,7 @@ def ranking_weight(severity: Severity | None, probability: float, density: float
 
 
 class Violated(Record, ABC):
-    """Base of violations, with and without contact: the rules they are valid by, and their verdict."""
+    """Base of violations with and without contact: validity rules and verdict."""
 
     verdicts: Mapping[str, bool]
     """Validity rule → passed."""
@@ -92,7 +92,7 @@ class Violated(Record, ABC):
 
     @property
     def prevention_in_words(self) -> str | None:
-        """Such as "the RSS driver would have prevented it"; None where no reference driver was asked."""
+        """Names the drivers that prevent it; None if none was asked."""
         if not self.prevention:
             return None
         names = [name for name, prevents in self.prevention.items() if prevents and name != TTC_RULE]
@@ -117,7 +117,7 @@ class Violated(Record, ABC):
 
     @property
     def prevention(self) -> Mapping[str, bool]:
-        """Reference driver → whether it would have prevented it; empty where none was asked."""
+        """Reference driver → whether it prevents it; empty if none was asked."""
         drivers = self.judged.drivers
         return {name: each if isinstance(each, bool) else each.avoids for name, each in drivers.items()}
 
@@ -136,7 +136,7 @@ class Violated(Record, ABC):
 
     @property
     def plausible(self) -> bool:
-        """Whether it is valid and road users do what its adversaries did, though it may be rare."""
+        """Whether it is valid and road users do what its adversaries did."""
         return self.behaviour is not None and self.behaviour.plausible
 
     @property
@@ -161,17 +161,17 @@ class Violated(Record, ABC):
 
     @property
     def headline_candidate(self) -> bool:
-        """Whether it is serious and plausible: a headline failure once its replay is the same."""
+        """Whether it is serious and plausible: headline if its replay repeats."""
         return self.serious and self.plausible
 
     @property
     def avoidable(self) -> bool:
-        """Whether it is valid, and a reference driver or full braking at once would have prevented it."""
+        """Whether it is valid and preventable, at least by full braking."""
         return self.valid and self.graded in (Grade.PREVENTABLE, Grade.FULL_BRAKING)
 
 
 class Violation(Violated):
-    """A requirement that counts and was violated without contact. Times count from the release."""
+    """Violation without contact of a requirement that counts; times from the release."""
 
     requirement: str
     time_s: Real
@@ -238,7 +238,7 @@ class RequirementResult(Record):
 
 
 class Collision(Violated):
-    """The ego's first contact with another actor, with everything later tiers need to judge it."""
+    """The ego's first contact with another actor, with facts to judge it."""
 
     time_s: Real
     """Since the adversaries' release."""
@@ -299,7 +299,7 @@ class Collision(Violated):
 
     @property
     def severity_in_words(self) -> str:
-        """Such as "severe: closing speed 11.0 m/s, impact speed 10.8 m/s, risk of death 3.5 %"."""
+        """Describes severity: "severe: closing speed 11.0 m/s, impact speed 10.8 m/s, …"."""
         return (
             f"{self.judgement.severity}: closing speed {self.relative_speed_mps:.1f} m/s, "
             f"impact speed {self.judgement.impact_mps:.1f} m/s, "
@@ -308,7 +308,7 @@ class Collision(Violated):
 
     @property
     def view_in_words(self) -> str:
-        """Time of the striker in view, as a clause: "which had been in its view for 1.0 s".
+        """Clause about the striker: "which came into its view only …".
 
         What a defect keeps from the ego counts too.
         """
@@ -336,7 +336,7 @@ class Collision(Violated):
 
     @property
     def event(self) -> str:
-        """Describes the ego's contact: "touches lead at a closing speed of 9.0 m/s"."""
+        """Describes the contact: "touches lead at a closing speed of 9.0 m/s"."""
         return f"touches {self.other_id} at a closing speed of {self.relative_speed_mps:.1f} m/s"
 
     @property

@@ -30,7 +30,7 @@ def read_series(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def read_limited(path: Path) -> bytes:
-    """Reads a file of at most `MOST_BYTES`; one byte more of a larger one, which `unpack_arrays` refuses."""
+    """Reads a file up to `MOST_BYTES` + 1, which `unpack_arrays` refuses."""
     with path.open("rb") as file:
         return file.read(MOST_BYTES + 1)
 

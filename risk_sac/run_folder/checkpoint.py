@@ -131,7 +131,7 @@ def _load(archive: bytes) -> tuple[str, State]:
 
 
 def _encode(value: object, where: str, arrays: list[np.ndarray[Any, Any]]) -> object:
-    """Returns a tree for JSON, whose arrays are numbers of `arrays`; `where` names the spot in errors."""
+    """Returns a JSON tree with indices into `arrays`; errors name `where`."""
     if type(value) in _PLAIN:  # exact: a subclass such as numpy.float64 or an enum would come back as another type
         return value
     if isinstance(value, bytes):

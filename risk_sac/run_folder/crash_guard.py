@@ -1,4 +1,4 @@
-"""Guard of a run against episodes that crash its process again and again."""
+"""Guard of a run against episodes that crash its process repeatedly."""
 
 import faulthandler
 import hashlib
@@ -34,7 +34,7 @@ class Crashes(BaseModel):
 
 
 class CrashGuard:
-    """Counts the crashes of a run's episodes, and notes how far the one being played is."""
+    """Counter of a run's crashes, with the present episode's progress noted."""
 
     def __init__(self, folder: Path) -> None:
         """Counts a crash of the last process."""
@@ -105,7 +105,7 @@ class CrashGuard:
 
 
 def _read(file: Path) -> Crashes:
-    """Crashes so far; none if the file is damaged, since an episode to blame will crash again."""
+    """Reads the crashes so far; zero if damaged, since crashes repeat."""
     try:
         return read_sealed(file, Crashes)
     except FileNotFoundError:
@@ -120,6 +120,6 @@ def _content(file: Path) -> bytes:
 
 
 def _stack(traceback: bytes) -> str:
-    """Digest of the Python frames; addresses and thread numbers differ from process to process."""
+    """Returns a digest of Python frames, without addresses and thread numbers."""
     frames = [line for line in traceback.splitlines() if line.startswith(b"  File ")]
     return hashlib.sha256(b"\n".join(frames)).hexdigest()[:16]

@@ -49,7 +49,7 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Removes the folders made by `claim` in a folder whose processes have gone."""
+    """Removes folders made by `claim` in `parent` whose processes have gone."""
     for folder in parent.iterdir():
         if _SCRATCH.fullmatch(folder.name):
             with contextlib.suppress(OSError):  # its process lives, or it is another user's
@@ -59,7 +59,7 @@ def remove_abandoned(parent: Path) -> None:
 
 
 def claim(folder: Path) -> int:
-    """Makes a folder named by `scratch_name`, and removes those beside it whose processes have gone.
+    """Makes a folder named by `scratch_name`; removes abandoned ones beside it.
 
     Returns the descriptor that locks it; the kernel unlocks it when the process dies.
     """
@@ -153,7 +153,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def lock(path: Path, *, wait: bool = False) -> IO[bytes]:
-    """Locks a file, which is made where there is none; close it to unlock it.
+    """Locks a file, creating it if missing; closing the file unlocks it.
 
     The kernel unlocks it when the process dies.
 
@@ -172,7 +172,7 @@ def lock(path: Path, *, wait: bool = False) -> IO[bytes]:
 
 @contextlib.contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Makes a folder of results and keeps other processes from working in it.
+    """Makes a folder of results and locks it against other processes.
 
     Raises:
       ConfigError: another process works in it, or it cannot be written.
@@ -199,12 +199,12 @@ def held(folder: Path) -> Iterator[None]:
 
 
 def set_aside(path: Path) -> Path:
-    """Renames a damaged file, so that nothing takes it for a good one; returns its new path."""
+    """Renames a damaged file so that nothing reads it; returns its path."""
     return path.replace(path.with_name(f"{path.name}.damaged"))
 
 
 def sha256(path: Path) -> str | None:
-    """SHA-256 of a file's content, in hexadecimal; None if it cannot be read."""
+    """Returns the hexadecimal SHA-256 of a file; None if unreadable."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -218,7 +218,7 @@ def write_sealed(path: Path, document: object, *, mode: int = 0o666) -> None:
 
 
 def read_sealed(path: Path, kind: type[T]) -> T:
-    """Reads what `write_sealed` wrote; raises `DamagedError` if it is not as it was written."""
+    """Reads a file of `write_sealed`; raises `DamagedError` if it has changed."""
     try:
         return unseal(path.read_bytes(), kind)
     except DamagedError as error:
@@ -226,7 +226,7 @@ def read_sealed(path: Path, kind: type[T]) -> T:
 
 
 def seal(document: Any) -> bytes:
-    """A pydantic model, dataclass or dict with at least one field as sealed JSON."""
+    """Returns a model, dataclass or dict, not empty, as sealed JSON."""
     kind: Any = type(document)
     text = _adapter(kind).dump_json(document, indent=2)
     return text.removesuffix(_END) + f',\n  "sha256": "{hashlib.sha256(text).hexdigest()}"\n}}\n'.encode()
@@ -253,7 +253,7 @@ def sealed_pieces(document: Any, rows: Iterable[Any]) -> Iterator[bytes]:
 
 
 def unseal(content: bytes, kind: type[T]) -> T:
-    """The document that was sealed; raises `DamagedError` if the content is not as it was sealed."""
+    """Returns the document that was sealed; raises `DamagedError` if changed."""
     seal_match = _SEAL.search(content)
     if seal_match is None:
         raise DamagedError("it does not end in its SHA-256: it was cut short, or something else wrote it")

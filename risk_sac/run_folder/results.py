@@ -1,4 +1,4 @@
-"""Files of a run's folder, under `risk-sac run` and in the service alike.
+"""Files of a run's folder, the same in CLI and service.
 
 results.json    the spec, the metrics and every failure, sealed; rewritten at each checkpoint and at the end
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
@@ -37,7 +37,7 @@ def series_name(index: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedFailure:
-    """An episode in which a requirement that counts was violated, with or without contact, refused ones included."""
+    """Episode that violated a requirement that counts, refused violations included."""
 
     id: str  # the episode's, as the service says it too
     series: str  # file of its time series, relative to results.json
@@ -45,7 +45,7 @@ class RecordedFailure:
 
     @classmethod
     def of(cls, run_id: str, episode: EpisodeRecord) -> "RecordedFailure":
-        """The failure of an episode, its file named as the run names it."""
+        """Returns the failure of an episode, with its series file's name."""
         return cls(id=episode.id_in(run_id), series=f"{FAILURES}/{series_name(episode.index)}", episode=episode)
 
 
@@ -96,7 +96,7 @@ def write_results(folder: Path, results: RunResults, failures: Iterable[Recorded
 
 
 def read_results(path: Path) -> RunResults:
-    """Reads results.json, or the one in a folder; raises `ConfigError` if it is missing or damaged."""
+    """Reads results.json, or a folder's; raises `ConfigError` if missing or damaged."""
     file = path / RESULTS if path.is_dir() else path
     try:
         return read_sealed(file, RunResults)
@@ -146,7 +146,7 @@ class Verified:
         )
 
     def headlined(self, metrics: RunMetrics, judged: Sequence[EpisodeRecord]) -> RunMetrics:
-        """Adds the headline to the metrics of a phase, whose episodes are `judged`."""
+        """Adds the headline of a phase's `judged` episodes to its metrics."""
         repeating = self.episodes.keys() - self.flaky
         first: dict[str, DrivenBy | None] = {}  # of a kind: what drove the episode
         published: dict[str, None] = {}  # kinds
@@ -167,7 +167,7 @@ class Verified:
 
 
 def with_headline(results: RunResults, verified: Verified) -> RunResults:
-    """The results of a run with the headline failures of each phase in its metrics."""
+    """Returns the results with each phase's headline failures in its metrics."""
     judged = verified.judged([failure.episode for failure in results.failures])
 
     def told(metrics: RunMetrics | None, *, evaluating: bool) -> RunMetrics | None:
@@ -182,7 +182,7 @@ def with_headline(results: RunResults, verified: Verified) -> RunResults:
 
 
 def _variants(episode: EpisodeRecord) -> Mapping[tuple[str, str], str]:
-    """Phase and variant of each valid violation of an episode → its requirement."""
+    """Returns phase and variant of each valid violation → its requirement."""
     return {(episode.phase, variant_name(each)): each.requirement for each in episode.valid_violations}
 
 

@@ -1,4 +1,4 @@
-"""Time series of an episode: collected while it runs, written if the ego touched something."""
+"""Time series of an episode: collected while played, written after a violation."""
 
 import hashlib
 import io
@@ -51,7 +51,7 @@ class Trace:
 
     @property
     def min_ttc_s(self) -> float:
-        """Smallest TTC since the release, over the actors the ego answers for; the cap where nothing was played."""
+        """Smallest TTC since the release; the cap where nothing was played."""
         return min((m.signals["ttc_s"] for m in self.since_release), default=TTC_CAP_S)
 
     @property
@@ -75,14 +75,14 @@ class Trace:
         return least
 
     def append(self, frame: Frame, measures: Measures, action: Sequence[float] | None) -> None:
-        """Records a frame and the action that led to it, None up to the release."""
+        """Records a frame and the action before it, None up to release."""
         self.frames.append(frame)
         self.measures.append(measures)
         if action is not None:
             self.actions.append(action)
 
     def series(self) -> dict[str, NDArray[np.generic]]:
-        """Arrays by name: `T` frames, `n` actors of the first frame, NaN where one has left.
+        """Returns arrays by name: `T` frames, `n` actors, NaN after one leaves.
 
         `actions` is `T x a`, the action that led to the frame; NaN up to the release, which was at `released_s`. An
         actor of a story that was led away from it has the role of an adversary.

@@ -103,7 +103,7 @@ class AnswerCache:
         return None
 
     async def _renew(self, asked: Asked, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on and caches its answer once it begins, so slow readers do not block others."""
+        """Passes a request on and caches its answer once it begins."""
         self._passed_on += 1
         number, renewal = self._passed_on, asyncio.Event()
         if asked in self._answers:

@@ -47,7 +47,7 @@ class Server(uvicorn.Server):
         super().__init__(uvicorn.Config(app, http=http, h11_max_incomplete_event_size=MOST_HEAD_BYTES, **options))
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Starts to listen, with a long queue of connections that are not accepted yet."""
+        """Starts to listen, with a long queue of connections not yet accepted."""
         await super().startup(sockets)
         # asyncio also takes the backlog as the number of connections that it accepts in one turn, which must be small.
         for listening in (each for server in self.servers for each in server.sockets):
@@ -58,7 +58,7 @@ class Server(uvicorn.Server):
 
 
 def page_addresses(server: uvicorn.Server) -> list[str]:
-    """Returns the addresses of the page; a server on all addresses is shown at that of this machine."""
+    """Returns the page's addresses; loopback stands for a server on all addresses."""
     bound = [each.getsockname()[:2] for listening in server.servers for each in listening.sockets]
     named = [("127.0.0.1" if host in ("0.0.0.0", "::") else host, port) for host, port in bound]
     path = f"{server.config.root_path}/page/"
@@ -77,7 +77,7 @@ class Room:
         self._full_at = float("-inf")
 
     def enter(self, connection: "Connection") -> None:
-        """Makes room for a new connection by dropping the slowest if there are too many."""
+        """Makes room for a new connection by dropping the longest idle one."""
         if len(connection.connections) <= self._most:  # of the server, as uvicorn counts them
             return
         now = time.monotonic()
@@ -114,7 +114,7 @@ def _accepted_at_once() -> int:
 
 
 class Connection(H11Protocol):
-    """Uvicorn's HTTP protocol with deadlines for the request head and for reading the answer."""
+    """Uvicorn's HTTP protocol with deadlines for request heads and reading answers."""
 
     def __init__(self, *args: Any, room: Room, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -136,7 +136,7 @@ class Connection(H11Protocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Reads in pieces: h11 checks a head's size only while the head is incomplete."""
+        """Reads in pieces: h11 limits a head's size only while incomplete."""
         for first in range(0, len(data), PIECE_BYTES):
             if not self.transport.is_closing():
                 super().data_received(data[first : first + PIECE_BYTES])
@@ -155,7 +155,7 @@ class Connection(H11Protocol):
         super().on_response_complete()
 
     def pause_writing(self) -> None:
-        """Sets a deadline for the client that reads more slowly than the answer is written."""
+        """Sets a deadline for a client that reads too slowly."""
         super().pause_writing()
         self._room.unread[self] = time.monotonic()
         self._await_reading()
@@ -208,14 +208,14 @@ class Connection(H11Protocol):
 
 
 class BodyLimit:
-    """ASGI middleware that refuses bodies that are too large or arrive too slowly."""
+    """ASGI middleware that refuses bodies too large or too slow."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
         self._app = app
         self._settings = settings
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on; reading a refused body raises the refusal, which the app answers with."""
+        """Passes on; reading a refused body raises an error, which is answered."""
         headers = dict(scope["headers"]) if scope["type"] == "http" else {}
         if b"content-length" not in headers and b"transfer-encoding" not in headers:
             await self._app(scope, receive, send)

@@ -1,4 +1,4 @@
-"""Titles and examples of all calls, for the page that describes the API."""
+"""Titles and examples of all calls, for the API's page."""
 
 import inspect
 import itertools
@@ -91,7 +91,7 @@ BODIES: Mapping[str, Mapping[str, Any]] = {
 
 
 def describe_calls(paths: dict[str, dict[str, Any]]) -> None:
-    """Gives each operation a title, and an example to its path, its body and its description."""
+    """Adds a title and examples to each operation."""
     for path, operations in paths.items():
         for method, operation in operations.items():
             name = operation["operationId"]
@@ -249,7 +249,7 @@ def _simplified(node: Any) -> Any:
 
 
 def _inherited(schemas: dict[str, Any]) -> dict[str, Any]:
-    """Returns the schemas, in which fields that several records inherit are those of the base."""
+    """Returns the schemas, with fields that several records inherit in the base."""
     known = {each.__name__: each for each in _records(Record)}
     records = {name: known[name] for name in schemas if name in known}
     ancestors = [base for each in records.values() for base in each.__mro__[1:]]
@@ -264,7 +264,7 @@ def _inherited(schemas: dict[str, Any]) -> dict[str, Any]:
 
 
 def _less_its_base(name: str, schemas: Mapping[str, Any], records: Mapping[str, type[Record]]) -> Any:
-    """Returns a schema without what its nearest base among the schemas has, which it names in its place."""
+    """Returns a schema that refers to its nearest base for inherited fields."""
     schema, record = schemas[name], records.get(name)
     base = next((each.__name__ for each in record.__mro__[1:] if each.__name__ in schemas), None) if record else None
     if base is None or not schemas[base]["properties"].items() <= schema["properties"].items():
@@ -294,7 +294,7 @@ def _share(document: dict[str, Any]) -> None:
 
 
 def _shared(kind: str, places: Sequence[Any], only: Sequence[str] = ()) -> dict[str, Any]:
-    """Replaces repeated entries by references; returns the referenced components. `only` names keys, else all count."""
+    """Replaces repeated entries (`only` these keys) by references; returns the components."""
     entries = [(place, key) for place in places for key in (place if isinstance(place, dict) else range(len(place)))]
     entries = [(place, key) for place, key in entries if not only or key in only]
     counts = Counter(json.dumps(place[key], sort_keys=True) for place, key in entries)

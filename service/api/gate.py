@@ -33,7 +33,7 @@ RequestHeaders = Mapping[bytes, bytes]
 
 
 class Gate:
-    """ASGI middleware: host, origin, key, rate, scope and share of the connections, in this order."""
+    """ASGI middleware: checks host, origin, key, rate, scope and share, in order."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
         self._app = app
@@ -103,7 +103,7 @@ class Gate:
             return False
 
     def _caller(self, scope: Scope, headers: RequestHeaders) -> Caller:
-        """Finds the caller by the request's key or addresses; raises 401, or 503 if the keys are unreadable."""
+        """Returns the caller by key or address; raises 401 or 503."""
         try:
             keyless = self._keys.open and self._keyless
             if keyless and not (abroad := _remote_clients(scope)):
@@ -125,7 +125,7 @@ class Gate:
 
 
 def _remote_clients(scope: Scope) -> list[str]:
-    """Returns the addresses of a request that are not loopback: its client's, and all that proxies state.
+    """Returns a request's non-loopback addresses: its client's and those proxies state.
 
     A client may forge the first of them, and a proxy that is not trusted states the client's, too.
     """
@@ -135,12 +135,12 @@ def _remote_clients(scope: Scope) -> list[str]:
 
 
 def _address(scope: Scope) -> str:
-    """Returns the address of a request's client, as a trusted proxy states it."""
+    """Returns the address of the client, as a trusted proxy states it."""
     return scope["client"][0] if scope.get("client") else ""
 
 
 class RateLimit:
-    """Counts the requests of each key, and of each address without one, in windows of a second."""
+    """Counter of the requests of each key or keyless address per second."""
 
     def __init__(self, per_second: int) -> None:
         self._per_second = per_second
@@ -161,7 +161,7 @@ class RateLimit:
 
 
 class Shares:
-    """Bounds the open requests of each key, so that one key cannot take all connections."""
+    """Bound on the open requests of each key."""
 
     def __init__(self, connections: int) -> None:
         self._connections = connections
@@ -205,7 +205,7 @@ def check_host(scope: Scope, headers: RequestHeaders, allowed: frozenset[str]) -
 
 
 def _host_name(host: str) -> str:
-    """A host without its port and without the brackets of IPv6: `[::1]:8000` -> `::1`."""
+    """Returns a host without port and brackets of IPv6: `[::1]:8000` -> `::1`."""
     host = host.lower()
     parts = _HOST.fullmatch(host)
     return host if parts is None else parts["address"] or parts["name"]

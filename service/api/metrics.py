@@ -77,7 +77,7 @@ RATES = {"ecr": "Valid contacts", "pcr": "Preventable contacts"}
 
 
 def request_latencies() -> Histogram:
-    """Returns the histogram of times to the beginning of an answer, by route, method and status."""
+    """Returns the histogram of answer times, by route, method and status."""
     return Histogram(
         "risk_sac_request_seconds",
         "Time until an answer began.",
@@ -165,7 +165,7 @@ def _of_cluster(cluster: ClusterState | None) -> Iterator[Metric]:
 
 
 class _Monotone:
-    """Turns sums over rows into counters: deleted rows must not look like a reset."""
+    """Counters made of sums over rows; they never fall with deleted rows."""
 
     def __init__(self, labels: Sequence[str]) -> None:
         self._labels = labels

@@ -26,7 +26,7 @@ _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"
 
 
 class Observe:
-    """ASGI middleware, outermost: counts and logs refused requests too, and adds headers that every answer has."""
+    """Outermost ASGI middleware: counts, logs, and adds headers, for refused requests too."""
 
     def __init__(self, app: ASGIApp, latencies: Histogram) -> None:
         self._app = app

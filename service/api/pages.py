@@ -35,13 +35,13 @@ class Cursors:
         self._cipher = AESSIV(secret)
 
     def encode(self, number: int | None, listed: str, project: str | None) -> str | None:
-        """Makes the cursor after a page's last item, for one list and reader."""
+        """Makes the cursor after an item, bound to list and reader."""
         if number is None:
             return None
         return base64.urlsafe_b64encode(self._cipher.encrypt(number.to_bytes(8), _bound(listed, project))).decode()
 
     def decode(self, cursor: str | None, listed: str, project: str | None) -> int | None:
-        """Reads the number in a cursor; 422 unless `encode` made it for this list and reader."""
+        """Returns a cursor's number; 422 unless made for this list and reader."""
         if cursor is None:
             return None
         try:
@@ -57,7 +57,7 @@ def _bound(listed: str, project: str | None) -> list[bytes]:
 
 
 def entity_tag(*parts: str) -> str:
-    """Returns a weak tag, since it identifies the content and not the bytes."""
+    """Returns a weak tag: it identifies the content, not the bytes."""
     return f'W/"{"-".join(parts)}"'
 
 
@@ -90,7 +90,7 @@ def link(request: Request, path: str) -> str:
 
 
 def as_json(record: BaseModel) -> Response:
-    """Returns a record as JSON; FastAPI would write numbers that are not finite as strings."""
+    """Returns a record as JSON, with null for non-finite numbers."""
     return Response(wire(record), media_type="application/json")
 
 

@@ -62,7 +62,7 @@ async def read_posted(request: Request, model: type[Model]) -> Model:
 
 
 async def _read_json(request: Request) -> tuple[bytes, Any]:
-    """Returns the body raw and parsed; a problem unless it is JSON within limits, without repeated fields."""
+    """Returns the body raw and parsed, within limits and without repeated fields."""
     media_type(request, ["application/json"])
     content = (await request.body()).removeprefix(codecs.BOM_UTF8)
     if content.count(b",") > MOST_COMMAS:
@@ -97,7 +97,7 @@ def _validated(content: bytes, model: type[Model]) -> Model:
 
 
 def media_type(request: Request, wanted: Collection[str], hint: str = "") -> str:
-    """Returns the media type of a body; 415, which ends with `hint`, for others and for compressed bodies."""
+    """Returns a body's media type; 415, with `hint`, for others or compression."""
     given = request.headers.get("content-type", "")
     declared = given.partition(";")[0].strip().lower()
     if declared not in wanted:

@@ -95,7 +95,7 @@ RETRIED = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABL
 
 
 class ProblemError(Exception):
-    """Error answer; `detail` has what was got, what was expected and the remedy.
+    """Error answer; `detail` names what was got and expected, and the remedy.
 
     Each 429 and 503 has a `Retry-After`: `retry_s`.
     """
@@ -153,7 +153,7 @@ def add_problem_handlers(app: FastAPI) -> None:
 
 
 def problem_response(path: str, problem: ProblemError) -> JSONResponse:
-    """Returns a problem as a response for middleware, which knows the path alone."""
+    """Returns a problem as a response, given the path alone."""
     body = ProblemDetails(
         type=f"urn:risk-sac:problem:{problem.status.name.lower().replace('_', '-')}",
         title=problem.status.phrase,
@@ -264,7 +264,7 @@ async def _left(request: Request, error: Exception) -> Response:
 
 
 def _methods(request: Request, of_first: str) -> set[str]:
-    """Returns the methods of all routes at this path; Starlette names those of the first.
+    """Returns the methods of all routes at this path, not the first's.
 
     A path without parameters takes precedence, as in OpenAPI: `check` is no campaign id.
     """

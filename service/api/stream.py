@@ -46,7 +46,7 @@ class Streams:
     async def follow(
         self, campaign_id: str, position: int, stopping: anyio.Event, *, ended: bool
     ) -> AsyncIterator[bytes]:
-        """Yields events after a position, until the campaign's end or deletion, or the server's stop.
+        """Yields events after a position, until the campaign or the server ends.
 
         At most one batch is buffered for a slow client.
 
@@ -95,7 +95,7 @@ class Streams:
 
 
 def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
-    """Returns the position of an event id of this campaign; None if it is unknown."""
+    """Returns the position of the campaign's event id; None if unknown."""
     try:
         text = base64.b64decode(event_id.encode("ascii"), altchars=b"-_", validate=True).decode("ascii")
     except (UnicodeError, binascii.Error):

@@ -1,4 +1,4 @@
-"""API keys: their file on disk, and a running server's view of it.
+"""API keys: their file, and a running server's view of it.
 
 A key reads `rsk_ID_SECRET`. The id is public and finds the record; of the secret only a hash is kept. One SHA-256 is
 enough: slow hashes make guessable passwords expensive to guess, and 256 random bits cannot be guessed.
@@ -100,7 +100,7 @@ class KeyFile:
             raise KeysError(f"keys file {str(self.path)!r} cannot be read: {error.strerror}") from error
 
     def create(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
-        """Adds a key and returns it with its token; from now on every caller needs a key."""
+        """Adds a key and returns it with its token; ends keyless access."""
         with self._turn():
             keys = self.read() if self.path.exists() else None  # the first one replaces a lost file
             key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(32)
@@ -138,7 +138,7 @@ class KeyFile:
 
 
 class KeyRing:
-    """A server's view of the keys; changes of the file count from the next request on.
+    """A server's view of the keys, current at each request.
 
     A request costs one or two stats. With an unreadable or missing file each look-up raises until it is intact again.
     """
@@ -155,7 +155,7 @@ class KeyRing:
         return self._read() is None
 
     def find(self, token: str) -> Key | None:
-        """Returns the valid key of a token, else None; raises KeysError if the file is unreadable or lost."""
+        """Returns a token's valid key or None; KeysError without a readable file."""
         keys, parts = self._read() or {}, _TOKEN.fullmatch(token)
         key = None if parts is None else keys.get(parts[1])
         return key if key is not None and parts is not None and key.opened_by(parts[2]) else None
@@ -182,7 +182,7 @@ class KeyRing:
 
 
 def _signature(path: Path) -> tuple[int, ...] | None:
-    """Returns metadata that changes with each replacement of the file; None where it cannot be had."""
+    """Returns metadata that changes when the file is replaced, None if unreadable."""
     try:
         status = os.stat(path)
     except OSError:
@@ -199,12 +199,12 @@ def _unknown(key_id: str) -> KeysError:
 
 
 def fair_share(places: int, keys: int) -> int:
-    """Returns how many places each of some keys may hold, with one share left for a new key."""
+    """Returns a key's share of places, with one spare for new keys."""
     return max(1, places // (keys + 1))
 
 
 def check_exposure(settings: ServiceSettings) -> None:
-    """Refuses to serve other machines without keys, and anyone if the keys are unreadable."""
+    """Refuses to serve other machines without keys, or with an unreadable file."""
     path = settings.keys_file
     keys = KeyFile(path).read() if path.exists() or not is_loopback(settings.host) else ()
     if is_loopback(settings.host) or any(key.revoked_at is None for key in keys or ()):

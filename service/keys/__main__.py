@@ -1,4 +1,4 @@
-"""`python -m service.keys`: create, list and revoke API keys; a running server applies changes at once."""
+"""`python -m service.keys`: create, list and revoke API keys; applies at once."""
 
 import argparse
 import re

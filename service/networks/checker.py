@@ -39,7 +39,7 @@ _OPTIONS = (
 
 
 def load(names: Mapping[DocumentKind, Sequence[str]]) -> list[str]:
-    """Loads files of the current folder and runs a few steps, without output or user options.
+    """Loads files of the current folder and runs a few steps silently.
 
     Returns what SUMO warned of; an UploadError has SUMO's own message.
     """
@@ -84,7 +84,7 @@ MOST_WARNINGS = 20
 
 
 def check(upload: Path) -> CheckReport:
-    """Rewrites the documents of an upload, reads the net, and loads all in the simulator."""
+    """Checks an upload: rewrites its documents, reads its net, loads all."""
     with tempfile.TemporaryDirectory(dir=".") as scratch:
         converted = present_net(upload, Path(scratch), "the upload")
         root = read_tree(converted.file)

@@ -111,7 +111,7 @@ def _posted(upload: bytes, action: str, ego_entity: str) -> bytes:
 
 
 def _unpacked(upload: bytes, folder: Path) -> Scenario:
-    """Reads a document and puts its nets into a folder, as SUMO nets of the present format.
+    """Reads a document and writes its nets in SUMO's present format.
 
     Raises:
       ConfigError: the upload is neither a document nor an archive of one, or a net cannot be read.

@@ -36,7 +36,7 @@ _REPORTS = TypeAdapter(CheckReport)
 
 
 class Incoming:
-    """Upload that is written to disk as it arrives; its opener closes it."""
+    """Upload that is written to disk on arrival; its opener closes it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -68,7 +68,7 @@ class Incoming:
 
 
 def inspect(folder: Path, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:
-    """Checks the file `upload` of a folder in a separate process and returns its report."""
+    """Checks a folder's `upload` in a separate process; returns the report."""
     with disk_refusals("the upload cannot be checked"):
         result = run_helper(
             checker,
@@ -124,7 +124,7 @@ class NetworkStore:
 
     @contextmanager
     def receive(self, key_id: str | None = None) -> Iterator[Incoming]:
-        """Makes a folder for one upload, removed again unless `add` made a network of it."""
+        """Makes a folder for one upload, removed unless `add` keeps it."""
         with self._counting:
             self._check_share(key_id)
             self._at_work[key_id] += 1
@@ -175,7 +175,7 @@ class NetworkStore:
             return next((network for network in every if network.sha256 == sha256), None)
 
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
-        """Lists networks, newest first, before the `last` of an earlier page; skips damaged ones."""
+        """Lists networks, newest first, before an earlier page's `last`; skips damaged ones."""
         with disk_refusals("the networks cannot be read"):
             found = sorted((int(path.name[1:], 16), path) for path in self._paths(project))
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
@@ -195,7 +195,7 @@ class NetworkStore:
         return self._path(network_id, project)
 
     def check_files(self, folder: Path) -> None:
-        """Raises `StorageError` if a file of a network differs from what the checker wrote."""
+        """Raises `StorageError` if a network's file differs from what was checked."""
         with disk_refusals("a network cannot be read"):
             for file in _read(folder).files:
                 if hashlib.sha256((folder / file.name).read_bytes()).hexdigest() != file.sha256:

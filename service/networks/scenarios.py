@@ -1,4 +1,4 @@
-"""Scenarios of the service: those that ship, and those that projects have posted.
+"""Scenarios of the service: shipped ones, and those that projects have posted.
 
 Documents and nets lie in the library, under names that hold their digest. Beside it is a record for each project that
 posted one. What reads a net runs in a process of its own.
@@ -54,7 +54,7 @@ class Scenarios:
         self._drawing, self._shipped = threading.Lock(), dict[str, bytes]()  # pictures of those that ship
 
     def list(self, project: str | None) -> list[ScenarioSummary]:
-        """Returns the shipped scenarios, then a project's own, newest first; None: those of all projects."""
+        """Returns shipped scenarios, then a project's (None: all), newest first."""
         own = dict[str, ScenarioSummary]()
         for record in self._records(project):
             try:
@@ -65,7 +65,7 @@ class Scenarios:
         return [*(summary_of(name, shipped_document(name)) for name in shipped_names()), *newest]
 
     def get(self, name: str, project: str | None) -> ScenarioDetails:
-        """Returns a scenario with its document; raises `NotFoundError` if the project has none of this name."""
+        """Returns a scenario with document; raises `NotFoundError` if the project lacks it."""
         if name in shipped_names():
             row, text = summary_of(name, shipped_document(name)), scenario_file(name).read_text()
         else:
@@ -103,11 +103,11 @@ class Scenarios:
         return self.get(name, project), new
 
     def check(self, upload: bytes, ego_entity: str = "") -> ScenarioCheck:
-        """Checks a document and plays 20 scenes of it; raises `ConfigError` as `add` does, and stores nothing."""
+        """Checks a document, plays 20 scenes, stores nothing; raises as `add`."""
         return ScenarioCheck.model_validate_json(self._run("check", upload, ego_entity))
 
     def picture(self, name: str) -> bytes:
-        """Draws a scenario that `get` has returned; raises `NotFoundError` if it is deleted meanwhile."""
+        """Draws a scenario from `get`; raises `NotFoundError` if deleted meanwhile."""
         if name not in shipped_names():
             with self._unless_deleted(name, None):
                 return self._run("picture", b"", name)
@@ -165,7 +165,7 @@ class Scenarios:
 
     @contextmanager
     def _unless_deleted(self, name: str, project: str | None) -> Iterator[None]:
-        """Turns an error of reading a scenario into `NotFoundError` if it is gone; another request may delete it."""
+        """Turns a reading error into `NotFoundError` if the scenario was deleted."""
         try:
             yield
         except (ConfigError, DamagedError, StorageError, OSError):

@@ -120,7 +120,7 @@ class Elsewhere(SpotBody):
 
 
 class Places(Record):
-    """Places of the patterns on a network, in the order of the net."""
+    """Places of the patterns on a network, in the net's order."""
 
     items: list[FoundPlace]
     elsewhere: list[Elsewhere]

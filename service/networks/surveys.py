@@ -28,7 +28,7 @@ class Surveys:
     """Runs searches for places as jobs that several requests may await."""
 
     def __init__(self, networks: NetworkStore, library: Path, stopping: Callable[[], bool] = lambda: False) -> None:
-        """Starts nothing; `library` is the folder of places that campaigns are run at, `stopping` ends searches."""
+        """Starts nothing; `library` stores kept places, `stopping` ends searches."""
         self._networks = networks
         self._library = library
         self._pools = {action: ThreadPoolExecutor(AT_ONCE, action) for action in ("survey", "keep")}
@@ -44,7 +44,7 @@ class Surveys:
             pool.shutdown(cancel_futures=True)
 
     def places(self, network_id: str, project: str | None) -> Places:
-        """Returns where the patterns fit on a network; its progress is below 1 while unknown.
+        """Returns where the patterns fit; its progress is below 1 while unknown.
 
         Raises:
           ConfigError: nothing can be found on it.
@@ -61,7 +61,7 @@ class Surveys:
         return read_sealed(folder / PLACES, Places)
 
     def picture(self, network_id: str, project: str | None) -> bytes:
-        """Returns a PNG of the network with its places; raises as `places`, or `BusyError` until drawn."""
+        """Draws the network and places as PNG; raises BusyError until drawn."""
         return self._left(network_id, project, PICTURE)
 
     def roads(self, network_id: str, project: str | None) -> bytes:
@@ -79,7 +79,7 @@ class Surveys:
         return (folder / name).read_bytes()
 
     def keep(self, network_id: str, project: str | None, pattern: str, place: str | None) -> list[str]:
-        """Stores a place, or all places of a pattern, as families; returns their names."""
+        """Stores a place, or all of a pattern, as families; returns names."""
         folder = self._networks.folder(network_id, project)
         asked = network_id, pattern, place
         arguments = ["keep", pattern, *([] if place is None else [place])]
@@ -100,7 +100,7 @@ class Surveys:
             return True
 
     def _job(self, asked: Asked, folder: Path, arguments: Sequence[str]) -> Future[dict[str, Any]]:
-        """Returns the job for a question: a running or finished one, or else a new one."""
+        """Returns the running or finished job for a question, or starts one."""
         with self._lock:
             job = self._jobs.get(asked)
             if job is not None and not (job.done() and (len(asked) == 1 or job.exception())):

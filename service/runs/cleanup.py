@@ -19,7 +19,7 @@ HOUR_S = 3600.0
 
 
 def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
-    """Raises QuotaError if a project has too many queued runs or no worker hours left."""
+    """Raises QuotaError for too many queued runs or spent worker hours."""
     if usage.queued_runs + new_runs > settings.quota_queued_runs:
         raise QuotaError(
             f"got {new_runs} runs with {usage.queued_runs} waiting already; wanted at most "
@@ -35,7 +35,7 @@ def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
 
 
 def exhausted(usage: Usage, settings: ServiceSettings) -> bool:
-    """Returns whether a project's worker hours are used up, so that its runs wait."""
+    """Returns whether a project has used up its worker hours."""
     return settings.quota_cpu_hours is not None and usage.cpu_s >= settings.quota_cpu_hours * HOUR_S
 
 
@@ -76,7 +76,7 @@ class StoragePause:
             logger.info("the pause itself cannot be written down; it is shown all the same")
 
     def try_again(self) -> None:
-        """Ends the pause if the disk has room, else doubles the wait; a no-op before it is over."""
+        """Ends the pause if the disk has room, else doubles the wait."""
         if time.monotonic() - self._refused_at < self._wait_s:
             return
         try:
@@ -92,7 +92,7 @@ class StoragePause:
 
 
 def refused(doing: str, folder: Path, error: OSError) -> str:
-    """Returns the error in one line without paths; the log has the paths."""
+    """Returns the error in one line; paths go to the log only."""
     return f"storage failed while {doing}: {error.strerror} ({Path(error.filename or folder).name!r})"
 
 
@@ -115,7 +115,7 @@ UNUSED_S = 3600.0  # that a place is kept for a campaign that has only been chec
 
 
 def dispose(folder: Path, forget: Callable[[], None]) -> None:
-    """Removes a campaign's folder, if any, and its rows; if `forget` raises, the folder stays."""
+    """Removes a campaign's folder and rows; keeps both if `forget` raises."""
     grave = folder.with_name(f"{PREFIX}{folder.name}")
     if folder.exists():
         folder.rename(grave)
@@ -168,7 +168,7 @@ class Retention:
             self._retire_at = time.monotonic() + RETENTION_S
 
     def remove_unused_places(self) -> None:
-        """Removes places and copies of earlier scripts that no campaign names, if it is time."""
+        """Removes, if due, places and script copies that no campaign names."""
         if time.monotonic() < self._prune_at:
             return
         try:

@@ -26,7 +26,7 @@ PORTS = {"http": 80, "https": 443}
 
 
 def check_allowed(url: str, prefixes: Sequence[str]) -> None:
-    """Refuses a URL that lies below none of the operator's; a ConfigError names `on_end`."""
+    """Raises ConfigError of `on_end` unless the operator allows the URL."""
     if not prefixes:
         raise ConfigError("on_end", shown(url), "none: the operator allows none by RISK_SAC_ON_END", "leave it out")
     if not any(_below(url, prefix) for prefix in prefixes):
@@ -34,7 +34,7 @@ def check_allowed(url: str, prefixes: Sequence[str]) -> None:
 
 
 def _below(url: str, prefix: str) -> bool:
-    """Whether origins are the same and the path is that of the prefix or below it."""
+    """Whether a URL equals a prefix or is below it, origin included."""
     asked, allowed = urlsplit(url), urlsplit(prefix)
     origins = [(each.scheme, each.hostname, each.port or PORTS.get(each.scheme)) for each in (asked, allowed)]
     folder = allowed.path.rstrip("/")
@@ -42,7 +42,7 @@ def _below(url: str, prefix: str) -> bool:
 
 
 class EndNotices:
-    """Delivers what is due; what is undelivered stays in the database, so that the next server goes on."""
+    """Delivery of due messages; the database keeps undelivered ones across restarts."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class EndNotices:
         allowed: Sequence[str],
         backoff_s: Sequence[float] = BACKOFF_S,
     ) -> None:
-        """Prepares; `lock` is held for each write, `backoff_s` are the waits between tries."""
+        """Prepares; `lock` is held for writes, `backoff_s` are waits between tries."""
         self._store, self._ledger, self._lock = store, ledger, lock
         self._allowed, self._backoff_s = allowed, backoff_s
         self._stopping = threading.Event()
@@ -63,7 +63,7 @@ class EndNotices:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops; a message on its way is sent again by the next server."""
+        """Stops; the next server sends an unfinished message again."""
         self._stopping.set()
         self._thread.join(TIMEOUT_S)
 

@@ -1,4 +1,4 @@
-"""Imports run folders of the command line as ended campaigns; the folders are copied.
+"""Import of command-line run folders as ended campaigns; copies the folders.
 
 An import is whole or absent: what an interrupted one leaves is removed at the next start, which imports again.
 """
@@ -48,7 +48,7 @@ class _Stopped(Exception):
 
 
 class Imports:
-    """Thread that imports each campaign in a folder that was not imported before."""
+    """Thread that imports the campaigns of a folder, each once."""
 
     def __init__(
         self,
@@ -127,7 +127,7 @@ class Imports:
         logger.info("%d runs imported", len(runs), extra={"campaign": campaign.id})
 
     def _begin(self, spec: CampaignSpec, key: str, sources: Mapping[str, object]) -> StoredCampaign:
-        """Stores a campaign of which no run waits in the queue, since a worker would play it."""
+        """Stores a campaign with no queued run, since workers would play it."""
         with self._lock:
             campaign = self._ledger.create(spec, key=key)
             for run in campaign.runs:
@@ -138,7 +138,7 @@ class Imports:
         return campaign
 
     def _import_run(self, campaign: StoredCampaign, run: StoredRun, source: Path) -> Iterator[int]:
-        """Imports a run, unless the campaign was cancelled; yields numbers of episodes as they are stored."""
+        """Imports a run unless cancelled; yields numbers of episodes as stored."""
         folder = self._settings.run_folder(campaign.id, run.id)
         if self._cancelled(run):
             return
@@ -172,7 +172,7 @@ class Imports:
 
 
 def _folders(root: Path) -> list[Path]:
-    """Returns the folders of campaigns: the root itself, or those right below it.
+    """Returns campaigns' folders: the root itself, or those right below it.
 
     Raises:
       ConfigError: there is none.
@@ -186,7 +186,7 @@ def _folders(root: Path) -> list[Path]:
 
 
 def check_plain(root: Path) -> None:
-    """Refuses a folder that holds anything but folders and plain files; the ConfigError names it.
+    """Raises ConfigError unless a folder holds only folders and plain files.
 
     What a link points at would be shown to everyone who may read the campaign.
     """
@@ -200,13 +200,13 @@ def check_plain(root: Path) -> None:
 
 
 def _key(spec: CampaignSpec, runs: Mapping[str, RunResults]) -> str:
-    """Returns the idempotency key of an import; it has a space, as no posted key has."""
+    """Returns an import's idempotency key; its space tells it from posted ones."""
     digests = sorted(str(run.digest) for run in runs.values())
     return f"{IMPORTED}{hashlib.sha256(''.join((spec.digest, *digests)).encode()).hexdigest()}"
 
 
 def _events(folder: Path) -> Iterator[EpisodeDone]:
-    """Yields the messages that a worker would have sent of the run in a folder."""
+    """Yields the messages that a run folder's worker would have sent."""
     results = read_results(folder)
     records = read_records(folder / EPISODES)
     accumulators: dict[str, MetricsAccumulator] = {}
@@ -229,7 +229,7 @@ def _sha256(file: Path) -> str:
 
 
 def _finished(folder: Path) -> Finished:
-    """Returns the last message that a worker would have sent of the run in a folder."""
+    """Returns the last message that a run folder's worker would have sent."""
     results, run = read_results(folder), read_run(folder)
     search: Phase = "iid" if results.spec.iid else "search"
     return Finished(

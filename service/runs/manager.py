@@ -1,4 +1,4 @@
-"""Runs campaigns: queue, limits, retry, pause, cancel, recover; the only writer of the database."""
+"""Manager of campaigns: queue, limits, retries, recovery; only it writes the database."""
 
 import logging
 import tempfile
@@ -84,11 +84,11 @@ class Manager:
             return [self._scheduler.active[number] for number in sorted(self._scheduler.active)]
 
     def silent_s(self, number: int) -> float | None:
-        """Returns the time since the last sign of life of a run's worker; None without a worker."""
+        """Returns the time since a worker's last sign of life, else None."""
         return self._executor.silent_s(number)
 
     def node_of(self, number: int) -> str | None:
-        """Returns the address of the cluster's node that executes a run; None on this machine."""
+        """Returns the address of a run's cluster node; None on this machine."""
         nodes = () if self._executor.cluster is None else self._executor.cluster.nodes
         return next((node.address for node in nodes if number in node.silences), None)
 
@@ -142,7 +142,7 @@ class Manager:
         prior: PriorContent | None = None,
         base_url: str = "",
     ) -> StoredCampaign:
-        """Queues a campaign with a copy of its prior, or finds the one queued with this idempotency key.
+        """Queues a campaign with a copy of its prior; idempotent by key.
 
         Args:
           spec: of the campaign.
@@ -174,7 +174,7 @@ class Manager:
         return campaign
 
     def checked(self, spec: CampaignSpec) -> CampaignSpec:
-        """Checks a campaign without reading its prior; returns it with the version of its ego.
+        """Checks a campaign but not its prior; returns it with ego version.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
@@ -247,7 +247,7 @@ class Manager:
 
     @contextmanager
     def _pausing(self, run: QueuedRun | None = None) -> Iterator[None]:
-        """Pauses if database or disk refuse; a named run has lost its worker and waits."""
+        """Pauses if database or disk refuse; `run` waits, its worker lost."""
         try:
             yield
         except StorageError as error:

@@ -54,7 +54,7 @@ class Waiting(NamedTuple):
 
 
 class TurnQueue(queue.Queue[Waiting]):
-    """Queue that serves its keys in turn, and what one key posted in the order of posting."""
+    """Queue that serves keys in turn, and each key's items in order."""
 
     def _init(self, maxsize: int) -> None:
         self.by_key: dict[str | None, deque[Waiting]] = {}  # the key that is next comes first
@@ -160,7 +160,7 @@ class Regressions:
             raise QuotaError(f"{share} regressions of this key wait, its share of the queue; wanted fewer", RETRY_S)
 
     def get(self, regression_id: str) -> StoredRegression:
-        """Returns the regression with this id; access to its campaign is checked before.
+        """Returns the regression with this id; callers check campaign access first.
 
         Raises:
           NotFoundError: there is none.
@@ -211,7 +211,7 @@ def _read(file: Path) -> StoredRegression:
 
 
 def _write(file: Path, regression: StoredRegression) -> None:
-    """Writes it into its campaign's folder, which must exist: a deleted campaign stays deleted."""
+    """Writes a regression into its campaign's folder, which must already exist."""
     try:
         file.parent.mkdir(exist_ok=True)
         replace_file(file, regression.model_dump_json(indent=2).encode())

@@ -49,7 +49,7 @@ class RunWaiting(ScheduledRun):
 
 
 class Workers(Record):
-    """Workers and queue of the service; runs of other projects are only counted."""
+    """Workers and queue of the service; other projects' runs are only counted."""
 
     slots: int
     """That the runs share."""

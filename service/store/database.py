@@ -79,7 +79,7 @@ def sqlite_file(url: str) -> Path | None:
 
 @contextmanager
 def held(engine: Engine) -> Iterator[None]:
-    """Keeps other servers off this database; for SQLite the data folder's lock does."""
+    """Locks a PostgreSQL database; for SQLite the data folder's lock suffices."""
     if engine.dialect.name != "postgresql":
         yield
         return
@@ -142,7 +142,7 @@ def _present_step(engine: Engine) -> str | None:
 
 
 def _step_forward(engine: Engine) -> None:
-    """Creates the tables of a new database, or applies all missing steps in one transaction."""
+    """Creates the tables, or applies all missing steps in one transaction."""
     if _present_step(engine) is None and not inspect(engine).has_table(ServerRow.__tablename__):
         _take(engine, _create)
     else:

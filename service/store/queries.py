@@ -1,4 +1,4 @@
-"""Queries of campaigns, episodes and events, and the counts that follow from episodes."""
+"""Queries of campaigns, episodes and events, and counts derived from episodes."""
 
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -50,7 +50,7 @@ from service.store.tables import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """Filter of episodes by what drove them and by their verdicts; None: any."""
+    """Filter of episodes by driver and verdicts; a None matches any."""
 
     requirement: str | None = None
     valid: bool = False
@@ -111,7 +111,7 @@ def find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
 def weighty_page(
     session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int | None
 ) -> StoredPage[Episode]:
-    """Returns the page of a query's failures after number `after`, the most likely and severe first."""
+    """Returns a page of failures after `after`, most likely and severe first."""
     weight = func.coalesce(EpisodeRow.weight, 0.0)  # refused ones last
     last = None if after is None else session.get(EpisodeRow, after)
     if last is not None:
@@ -124,7 +124,7 @@ def weighty_page(
 def episode_page(
     session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int
 ) -> StoredPage[Episode]:
-    """Returns the page of a query's episodes after number `after`; no outcomes means all."""
+    """Returns the page of episodes after `after`; no outcomes means all."""
     # A query for each outcome: the index has the order of a page only within one.
     query = query.where(EpisodeRow.number > after).order_by(EpisodeRow.number).limit(limit + 1)
     queries = [query.where(EpisodeRow.outcome == outcome) for outcome in outcomes] or [query]
@@ -181,7 +181,7 @@ def add_usage(session: Session, project: str, busy_s: float) -> None:
 
 
 def pace_s(newest_s: Collection[float]) -> float:
-    """Mean wall time of a run's newest episodes, s, without stalls; there is at least one."""
+    """Returns the mean time of a run's newest episodes, s, without stalls."""
     longest_s = STALL * median_low(newest_s)
     return fmean(each for each in newest_s if each <= longest_s)
 

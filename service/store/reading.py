@@ -45,7 +45,7 @@ class Known(NamedTuple):
 
 
 class DueNotice(NamedTuple):
-    """A message that is due, to the end of the campaign with this id."""
+    """Due message about a campaign's end."""
 
     campaign_id: str
     url: str
@@ -54,7 +54,7 @@ class DueNotice(NamedTuple):
 
 
 class Revisions:
-    """Campaigns' revisions in memory, noted on each write and first read, so that a poll needs no database.
+    """Campaigns' revisions in memory, so that a poll needs no database.
 
     Attributes:
       all: how often any campaign was written since the start.
@@ -101,7 +101,7 @@ class Store:
     """
 
     def __init__(self, url: str, *, opened: bool = False) -> None:
-        """Opens the database, creating it where there is none; connects to one that another process has opened."""
+        """Opens the database, creating it if missing; connects if already `opened`."""
         self.engine = connect(url) if opened else open_database(url)
         self.refusal: str | None = None
         self.revisions = Revisions()
@@ -151,7 +151,7 @@ class Store:
             return StoredPage(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
 
     def campaigns_of_ego(self, name: str, project: str | None, limit: int) -> list[StoredCampaign]:
-        """Returns the newest campaigns of a registered ego or, without a driver, of a profile; oldest first."""
+        """Returns the newest campaigns of an ego or profile, oldest first."""
         # JSON as it is stored has no spaces, and a quotation mark inside a text has a backslash before it.
         driver, profile = (CampaignRow.spec.contains(f'"{key}":"{name}"', autoescape=True) for key in DRIVERS)
         of_sumo = and_(profile, CampaignRow.spec.contains('"driver":null'))
@@ -177,7 +177,7 @@ class Store:
             return [DueNotice(id_, row.url, row.link, row.tries) for row, id_ in rows]
 
     def revision(self, campaign_id: str, project: str | None = None) -> str:
-        """Returns the revision of a campaign, which changes with its runs and episodes."""
+        """Returns a campaign's revision, which changes with its runs and episodes."""
         known = self.known_revision(campaign_id, project)
         if known is not None:
             return known
@@ -202,7 +202,7 @@ class Store:
             return event_page(session, find_campaign(session, campaign_id), limit, after)
 
     def count_of_events(self, campaign_id: str) -> int:
-        """Returns the number of events so far, which is the newest one's sequence."""
+        """Returns the number of events, which is the newest one's sequence."""
         with self._reading() as session:
             return find_campaign(session, campaign_id).events
 
@@ -242,7 +242,7 @@ class Store:
             return episode_page(session, query, outcomes, limit, after or 0)
 
     def records(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[StoredRecord]:
-        """Yields the campaign's search episodes in order of arrival; no outcomes means all."""
+        """Yields search episodes in order of arrival; no outcomes means all."""
         row = EpisodeRow
         query = select(row.number, row.run_number, row.record)
         query = query.where(row.campaign_number == number, *Judged(iid=False).conditions()).order_by(row.number)
@@ -290,14 +290,14 @@ class Store:
             return {row.project: row.number for row in session.execute(query)}
 
     def campaign_of(self, number: int) -> StoredCampaign:
-        """Returns the campaign of an existing run, without its other runs, which may be thousands."""
+        """Returns the campaign of an existing run, without its other runs."""
         with self._reading() as session:
             row = session.get_one(RunRow, number)
             campaign = row.campaign
             return StoredCampaign.from_row(campaign, self._shown_revision(campaign.revision), alone=row)
 
     def campaigns_of(self, numbers: Collection[int]) -> dict[int, StoredCampaign]:
-        """Returns the campaign of each of these runs that exists, with this run alone."""
+        """Returns the campaigns of runs that exist, each with its run alone."""
         query = select(RunRow).options(joinedload(RunRow.campaign)).where(RunRow.number.in_(numbers))
         with self._reading() as session:
             return {
@@ -326,7 +326,7 @@ class Store:
             return Usage(queued_runs=session.scalar(queued) or 0, cpu_s=cpu_s)
 
     def ended_before(self, moment: float, limit: int) -> list[str]:
-        """Returns ids of campaigns that ended before a moment (epoch seconds), oldest first."""
+        """Returns campaigns that ended before a moment (epoch s), oldest first."""
         query = select(CampaignRow.id).where(CampaignRow.state.in_(FINAL), CampaignRow.finished_at < moment)
         with self._reading() as session:
             return list(session.scalars(query.order_by(CampaignRow.number).limit(limit)))
@@ -345,7 +345,7 @@ class Store:
             return set(session.scalars(select(RunRow.family).distinct()))
 
     def episode_times(self) -> dict[str, dict[str, float]]:
-        """Returns family → method → seconds that an episode takes a slot, the median over the newest runs."""
+        """Returns slot seconds per episode by family and method: newest runs' median."""
         query = select(RunRow.family, RunRow.method, RunRow.pace_s * func.coalesce(RunRow.processes, 1))
         query = query.where(RunRow.pace_s.is_not(None)).order_by(RunRow.number.desc()).limit(NEWEST_RUNS)
         times: dict[str, dict[str, list[float]]] = {}

@@ -43,7 +43,7 @@ def advance(current: State, new: State) -> State:
 
 
 def campaign_state(current: State, runs: Collection[State]) -> State:
-    """Returns the state of a campaign whose runs (at least one) have these states.
+    """Returns the state of a campaign by those of its runs.
 
     A campaign ends with its last run. One failed run fails it; a cancelled campaign ends as cancelled unless every run
     had already succeeded.
@@ -99,7 +99,7 @@ class StoredRun(Run, RunResult):
 
     @property
     def iid(self) -> bool:
-        """Whether it belongs to an i.i.d. phase, whose counts are kept apart from searches."""
+        """Whether it is of an i.i.d. phase, counted apart from searches."""
         return self.method in IID_METHODS
 
 
@@ -139,7 +139,7 @@ class StoredCampaign(CampaignHead):
 
     @property
     def headline(self) -> int | None:
-        """Headline failures of search and evaluation; a kind found by several runs counts once."""
+        """Distinct headline failures of search and evaluation, pooled over all runs."""
         return pooled_headline(self._phases())
 
     @property
@@ -175,7 +175,7 @@ class StoredCampaign(CampaignHead):
         return spec
 
     def paused(self, reason: str) -> "StoredCampaign":
-        """Returns the campaign as paused, for a reason that is not stored yet."""
+        """Returns the campaign as paused, for a reason not yet stored."""
         paused = {"state": State.PAUSED, "reason": reason}
         runs = (run.model_copy(update=paused) if run.state is State.RUNNING else run for run in self.runs)
         return self.model_copy(update=paused | {"runs": tuple(runs)})
@@ -233,7 +233,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredPage(Generic[T]):
-    """Part of a list; `last` is the number to continue after, None at the end."""
+    """Part of a list; continues after number `last`, None at the end."""
 
     items: tuple[T, ...]
     last: int | None

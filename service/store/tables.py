@@ -133,7 +133,7 @@ class RequirementRow(Base):
 
 
 class EpisodeRow(Base):
-    """Episode of a run; a resumed run may report it again, which replaces it."""
+    """Episode of a run; a resumed run's repeated report replaces it."""
 
     __tablename__ = "episodes"
     __table_args__ = (
@@ -222,7 +222,7 @@ class NoticeRow(Base):
 
 
 class UsageRow(Base):
-    """Worker time that a project has used in one hour since the epoch."""
+    """Worker time that a project used in one hour since the epoch."""
 
     __tablename__ = "usage"
 

@@ -95,7 +95,7 @@ class Ledger:
             return StoredCampaign.from_row(row, str(row.revision))
 
     def start_run(self, number: int, processes: int = 1) -> None:
-        """Notes that a worker is launched for this run, with so many processes that play its episodes."""
+        """Notes that a run's worker starts, with this many rollout processes."""
         with self._run(number, "starting a run") as (session, row):
             _move(session, row, State.RUNNING)
             row.started_at = row.started_at or time.time()
@@ -104,7 +104,7 @@ class Ledger:
             self._newest_s.pop(number, None)
 
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
-        """Stores episodes with their run's number; replaces those that a resumed run reports differently.
+        """Stores episodes by run number; replaces those that resumed runs change.
 
         Returns:
           Numbers of the runs to which one was new.
@@ -184,7 +184,7 @@ class Ledger:
                     _settle(session, row.campaign)
 
     def resume(self) -> int:
-        """Queues or cancels runs without a worker; returns the number of queued ones.
+        """Queues or cancels runs without worker; returns the number queued.
 
         Those of imports, which never have one, are left alone.
         """
@@ -293,7 +293,7 @@ class Ledger:
 
 
 def _refuse(session: Session, run: RunRow, flaky: Mapping[int, Collection[str]]) -> None:
-    """Removes violations that do not repeat, by episode and requirement, from the run's failures."""
+    """Removes from a run's failures those violations that do not repeat."""
     if not flaky:
         return
     failures = select(EpisodeRow).filter_by(run_number=run.number, outcome=Outcome.FAILURE)

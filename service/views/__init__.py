@@ -1,1 +1,1 @@
-"""Response bodies made from stored records. Pure, except for reading files of a run."""
+"""Response bodies made from stored records; read only files of runs."""

@@ -80,7 +80,7 @@ def _adjustments(campaign: StoredCampaign) -> tuple[Adjustment, ...]:
 
 
 def totals(runs: Sequence[StoredRun]) -> list[Total]:
-    """Returns one total per family and method of the runs that have begun, in run order."""
+    """Returns a total per family and method of begun runs, in order."""
     groups: dict[tuple[str, str], list[RunMetrics]] = {}
     for run in runs:
         if run.metrics is not None:
@@ -129,7 +129,7 @@ Spread = NDArray[np.int64]
 
 
 class RunCurves(Record):
-    """Search of one run: each list has an entry per point; later refused failures do not count."""
+    """Curves of a search, an entry per point; later refused failures excluded."""
 
     run_id: str
     family: FamilyName
@@ -163,7 +163,7 @@ class Curves(Record):
 
 
 def curves(campaign: StoredCampaign, episodes: Iterable[StoredRecord], points: int) -> Curves:
-    """Returns curves of all searches with at most `points` points; a run's episodes come in order."""
+    """Returns curves of all searches, each with at most `points` points."""
     searches = {run.number: _RunningSums() for run in campaign.searches}
     for each in episodes:
         if each.record.searching:
@@ -225,7 +225,7 @@ def _curves(run: StoredRun, search: _RunningSums, points: int) -> RunCurves:
 
 
 def spread(count: int, points: int) -> Spread:
-    """Returns at most `points` of 1, …, `count`, evenly spread, with the last."""
+    """Returns at most `points` of 1, …, `count`, evenly, the last included."""
     if count == 0:
         return np.empty(0, dtype=np.int64)
     return np.unique(-(-count * np.arange(1, points + 1) // points))
@@ -248,7 +248,7 @@ Bins = NDArray[np.int64]
 
 
 class SceneParameterEffect(Record):
-    """Effect of a scene parameter on failure, and the episodes played in each part of it."""
+    """Effect of a scene parameter on failure, and episodes per part."""
 
     name: str
     unit: str
@@ -339,7 +339,7 @@ def _effect(axis: Axis, column: Floats, places: Bins, failed: Bools, tests: int)
 
 
 def _a12(failing: Floats, safe: Floats) -> tuple[float, float]:
-    """Vargha and Delaney's A12 of two samples and its p, NaN where one of them is empty."""
+    """Returns Vargha and Delaney's A12 and p, NaN for an empty sample."""
     from scipy.stats import mannwhitneyu  # here, because few ask for it, and every process of a server loads this
 
     if not failing.size or not safe.size:

@@ -84,7 +84,7 @@ class FamilyScenes(Record):
 
 
 class FailureTable(Record):
-    """Failures by columns: each list has an entry per failure, in order of arrival.
+    """Failures by columns: lists with an entry per failure, by arrival.
 
     An episode that violates several requirements is one failure. A violation for the headline names it, else a
     preventable one that is not minor, else a preventable one, else a contact, else the first.
@@ -183,7 +183,7 @@ class FailureTable(Record):
 def failure_table(
     campaign: StoredCampaign, failures: Iterable[StoredRecord], triages: Mapping[int, TriageState]
 ) -> FailureTable:
-    """Returns the table of these failures in their order; one without a triage is new."""
+    """Returns the failures' table, in their order; untriaged ones are new."""
     runs = {run.number: run for run in campaign.runs}
     distinct: defaultdict[tuple[int, str], DistinctFailures] = defaultdict(DistinctFailures)
     headline, variants = DistinctFailures(), dict[str, int]()
@@ -249,7 +249,7 @@ def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) ->
 
 
 def _kinds(naming: Sequence[Collision | Violation], rows: Sequence[Mapping[str, Any]]) -> list[KindRow]:
-    """Counts the failures of each kind, those with the most preventable failures first."""
+    """Counts the failures of each kind, most preventable ones first."""
     kinds: dict[str, dict[str, Any]] = {}
     variants: defaultdict[str, set[int]] = defaultdict(set)
     for worst, row in zip(naming, rows, strict=True):

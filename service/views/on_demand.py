@@ -32,7 +32,7 @@ class _Waiting(Generic[S]):
 
 
 class OnDemandCache(Generic[S]):
-    """Makes content in its own threads, so that other requests do not wait.
+    """Cache of content that it makes in threads, without blocking requests.
 
     Keys take turns: of each, one subject is made or next to be made.
     """

@@ -30,7 +30,7 @@ def log_tail(log: Path, lines: int) -> str:
 
 
 def _end(log: Path) -> bytes:
-    """Returns the last bytes without a partial first line, which may be half of a path."""
+    """Returns the log's end without a cut first line (half a path)."""
     try:
         with log.open("rb") as file:
             start = file.seek(max(0, file.seek(0, os.SEEK_END) - MOST_BYTES))
@@ -79,7 +79,7 @@ def _pace_s(run: StoredRun, known: Sequence[StoredRun]) -> float:
 
 
 def _left_s(run: StoredRun, spec: CampaignSpec, pace_s: float, start_s: float) -> float:
-    """Time that the run still needs, s; a limit of processor time ends its search sooner."""
+    """Returns a run's remaining time, s; a processor-time limit may shorten it."""
     done = run.episodes_done
     evaluation = 0 if run.iid else spec.budget.evaluation_episodes
     search_s = max(0, run.episodes_total - evaluation - done) * pace_s
@@ -90,7 +90,7 @@ def _left_s(run: StoredRun, spec: CampaignSpec, pace_s: float, start_s: float) -
 
 
 def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
-    """Computes when to ask again, s: after a twentieth of the time left.
+    """Computes when to ask again, s: after a twentieth of remaining time.
 
     Returns None once the campaign has ended.
     """
@@ -120,7 +120,7 @@ def summary_body(campaign: StoredCampaign, workers: int) -> CampaignSummary:
 
 
 def progress(campaign: StoredCampaign, workers: int) -> Progress:
-    """Returns counts over all runs, current values of running ones, and the time left."""
+    """Returns counts over all runs, current values of running ones, time left."""
     runs, searches = campaign.runs, campaign.searches
     present = _present(searches)
     sums = {name: sum(getattr(run, name) for run in runs) for name in OF_ALL}

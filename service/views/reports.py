@@ -68,7 +68,7 @@ class CampaignReport:
         return figure_names(self.comparison)
 
     def figure(self, name: str, format_: Format) -> bytes:
-        """Returns one figure as a file, drawn once; NotFoundError if there is no such figure."""
+        """Returns a figure's file, drawn once; raises NotFoundError if unknown."""
         if name not in self.figures:
             raise unknown_figure(self.campaign_id, name)
         with self._lock:  # a second request for a figure waits for the first
@@ -99,7 +99,7 @@ class Reports:
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
 
     def report(self, campaign: StoredCampaign) -> CampaignReport:
-        """Returns the current report of a campaign; blocks for seconds while statistics run."""
+        """Returns a campaign's current report; blocks for seconds of statistics."""
         name = self.edition(campaign)
         with self._lock:
             if self._newest is None or self._newest[0] != name:
@@ -109,7 +109,7 @@ class Reports:
             return self._newest[1]
 
     def matrix(self, campaign: StoredCampaign) -> tuple[CoverageMatrix, bool]:
-        """Returns the coverage of a campaign's finished runs, and whether it may be kept."""
+        """Returns the coverage of finished runs, and whether it may be kept."""
         edition = self.edition(campaign)
         if (made := self._matrices.get(edition)) is not None:
             return made, True
@@ -216,7 +216,7 @@ class CampaignRates(Record):
 
 
 def rates(made: CampaignReport, scenes_per_hour: float | None) -> bytes:
-    """Returns the failure rates as JSON; none where no run has the method `rate`."""
+    """Returns failure rates as JSON; empty without runs of method `rate`."""
     runs = [run for run in made.comparison.runs if run.spec.method == METHOD]
     items = [rates_of(run.spec, run.records, scenes_per_hour) for run in runs]
     return wire(CampaignRates(complete=not made.comparison.missing, items=items))
@@ -248,7 +248,7 @@ def drawn(made: CampaignReport, format_: Format) -> bytes:
 def evidence(
     made: CampaignReport, format_: str, base_url: str, regression: Regression | None, people: Mapping[TriageState, int]
 ) -> str:
-    """Returns all numbers of the report as JSON; as a page or Markdown with pictures, limits and commands."""
+    """Returns the evidence as JSON, or as page or Markdown with pictures."""
     comparison = _with_commands(made, base_url)
     facts = CampaignFacts(
         id=made.campaign_id,
@@ -303,7 +303,7 @@ MOST_CAMPAIGNS = 200  # of an ego; older ones are not read
 
 
 def trend_of(store: Store, settings: ServiceSettings, name: str, chosen: Sequence[str], project: str | None) -> Trend:
-    """Compares the versions of an ego, by its newest campaigns or by those that are chosen.
+    """Compares versions of an ego, by its newest or the chosen campaigns.
 
     Raises:
       ConfigError: the chosen campaigns are of another ego, or of different scenarios.

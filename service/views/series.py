@@ -1,4 +1,4 @@
-"""Time series, pictures, roads, twins and studies of a failure; tables of episodes.
+"""Time series, pictures, roads, twins and studies of failures; episode tables.
 
 Helper processes play studies, which need the simulator, and write tables, which need packages of 150 MB.
 """
@@ -38,7 +38,7 @@ _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
 def failure_body(campaign_id: str, failure: StoredFailure, triage: Triage | None, settings: ServiceSettings) -> Failure:
-    """Returns a failure with its time series, or the reason for none, and its triage."""
+    """Returns a failure with triage and series, or why there is none."""
     series, problem = None, None
     try:
         series = load_series(*series_file(campaign_id, failure, settings))
@@ -48,7 +48,7 @@ def failure_body(campaign_id: str, failure: StoredFailure, triage: Triage | None
 
 
 def series_file(campaign_id: str, failure: StoredFailure, settings: ServiceSettings) -> tuple[Path, str | None]:
-    """Returns path and SHA-256 of a failure's time series; SeriesLost if none was recorded."""
+    """Returns path and SHA-256 of a failure's series; SeriesLost if none."""
     if failure.series is None:
         raise SeriesLost("no time series was recorded")
     folder = settings.run_folder(campaign_id, failure.episode.run_id) / FAILURES
@@ -56,7 +56,7 @@ def series_file(campaign_id: str, failure: StoredFailure, settings: ServiceSetti
 
 
 def load_series(path: Path, sha256: str | None) -> Series:
-    """The series as a body; raises what `load_arrays` does, also for arrays that are no series."""
+    """Returns the series as a body; raises SeriesLost if unreadable or damaged."""
     arrays = load_arrays(path, sha256)
     try:
         return series_body(arrays)
@@ -65,7 +65,7 @@ def load_series(path: Path, sha256: str | None) -> Series:
 
 
 def series_body(arrays: Mapping[str, NDArray[Any]]) -> Series:
-    """Returns the public arrays as a body; numbers that are not finite are None."""
+    """Returns the public arrays as a body, with None for non-finite numbers."""
     told = arrays.keys() & Series.model_fields.keys()
     return Series.model_validate({name: _plain(name, arrays[name]) for name in told})
 
@@ -202,7 +202,7 @@ def roads_body(failure: FailureOfARun) -> RoadsBody:
 
 
 def thumbnail_of(failure: FailureOfARun, settings: ServiceSettings) -> str:
-    """Returns a failure as a small SVG; SeriesLost if its time series is lost."""
+    """Returns a failure as small SVG; SeriesLost without its time series."""
     place = failure.run.family, failure.episode.scene
     return thumbnail(recording_of(failure, settings), roads_of(*place), signal_heads(*place))
 
@@ -233,14 +233,14 @@ class Study:
 
 
 class Studies(OnDemandCache[Study]):
-    """Makes studies, one of a key at a time; raises SeriesLost or NotPlayable."""
+    """Studies, one at a time per key; raises SeriesLost or NotPlayable."""
 
     def __init__(self, settings: ServiceSettings, helper: Helper) -> None:
         super().__init__(self._answer, "failures", at_once=STUDIES_AT_ONCE)
         self._settings, self._helper = settings, helper
 
     async def get(self, subject: Study, key_id: str | None) -> bytes:
-        """Returns the study; what cannot be minimised or has no region is refused at once."""
+        """Returns the study; cores, motions and regions require a valid failure."""
         if subject.subject in ("core", "most-plausible", "region"):
             episode = subject.failure.episode
             try:

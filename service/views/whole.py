@@ -146,7 +146,7 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """Sources of views; a prior that names a copy is of no campaign."""
+    """Sources of views; a copied prior is of no campaign."""
 
     settings: ServiceSettings
     store: Store
@@ -196,14 +196,14 @@ class _Passing(Exception):
 
 
 class Views(OnDemandCache[CampaignView]):
-    """Makes views of small campaigns at once, and of large ones in a helper."""
+    """Views of campaigns: small ones made here, large ones in a helper."""
 
     def __init__(self, settings: ServiceSettings, store: Store, reports: Reports, helper: Helper, kept: int) -> None:
         super().__init__(self._helped, "views of large campaigns", kept)
         self._settings, self._store, self._reports, self._helper = settings, store, reports, helper
 
     async def content(self, view: CampaignView, campaign: StoredCampaign, key_id: str | None) -> Content:
-        """Returns the content of a view of a campaign, or raises what its making raises."""
+        """Returns the content of a campaign's view; raises what making raises."""
         if not _large(campaign):
             sources = Sources(self._settings, self._store, self._reports, campaign)
             return await run_in_threadpool(content_of, view, sources)
@@ -213,7 +213,7 @@ class Views(OnDemandCache[CampaignView]):
             return Content(content.args[0], lasting=False)
 
     async def figure(self, view: CampaignView, campaign: StoredCampaign, name: str, key_id: str | None) -> Content:
-        """Returns one figure of a view of them all; NotFoundError if there is no such figure."""
+        """Returns one figure of a view; raises NotFoundError if unknown."""
         if not _large(campaign):
             made = await run_in_threadpool(self._reports.report, campaign)
             return Content(await run_in_threadpool(made.figure, name, cast(Format, view.format)), made.lasting)
@@ -252,13 +252,13 @@ class Views(OnDemandCache[CampaignView]):
 
 
 class Priors:
-    """Reads what campaigns go on from, once per earlier campaign, in a helper process."""
+    """Priors of campaigns, read in a helper, once per earlier campaign."""
 
     def __init__(self, store: Store, views: Views) -> None:
         self._store, self._views = store, views
 
     async def of(self, spec: CampaignSpec, project: str, key_id: str | None) -> PriorContent | None:
-        """Returns the scripts that a campaign's prior names; None where it names none.
+        """Returns the scripts of a campaign's prior; None if it names none.
 
         Raises:
           ConfigError: there is no such campaign, it followed no scripts, or is like another family.
@@ -271,7 +271,7 @@ class Priors:
         return found.checked(spec.prior, spec.families)
 
     def _campaign_id(self, prior: str, project: str) -> str:
-        """Returns the id of the ended campaign that a prior names; empty for a copy."""
+        """Returns the id of a prior's ended campaign; empty for a copy."""
         if is_kept(prior):
             return ""
         try:

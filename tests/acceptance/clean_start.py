@@ -1,4 +1,4 @@
-"""Whether failures have bodies that overlap before their end, and which scenes are refused; per family and method.
+"""Overlaps of bodies before failures, and refused scenes, by family and method.
 
     python -m tests.acceptance.clean_start OUT [--episodes 500] [--seed 11]
 

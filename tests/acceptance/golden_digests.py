@@ -1,4 +1,4 @@
-"""Digests of small runs, recorded for the kind of processor and the versions they hold for.
+"""Digests of small runs, recorded by kind of processor and versions.
 
     python -m tests.acceptance.golden_digests
 
@@ -43,7 +43,7 @@ LEARNER = LearnerConfig(
 
 
 def fingerprint() -> dict[str, str]:
-    """What digests depend on beside the code: floating-point results differ in their last bits where any of it does."""
+    """Returns what digests depend on beside the code, to the last bit."""
     return {
         "machine": platform.machine(),
         "processor": binding.get_host_cpu_name(),  # what numba compiles for
@@ -68,12 +68,12 @@ def read() -> list[dict[str, Any]]:
 
 
 def recorded(wanted: dict[str, str]) -> dict[str, str] | None:
-    """Digests by family and method that were recorded with this fingerprint; None without any."""
+    """Returns recorded digests by family and method for this fingerprint, or None."""
     return next((one["digests"] for one in read() if one["fingerprint"] == wanted), None)
 
 
 def record() -> None:
-    """Replaces this machine's recording; if it changed, the others are of the code as it was and go."""
+    """Replaces this machine's recording; drops all others if it has changed."""
     here, digests = fingerprint(), {}
     for name in (f"{family} {method}" for family in SEEDS for method in METHODS if method != "boundary"):
         with TemporaryDirectory() as folder:

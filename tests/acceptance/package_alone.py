@@ -1,4 +1,4 @@
-"""Three failures of the package `fiss-planner` alone: its defaults, its plans followed exactly, without our adapter.
+"""Three failures of the package `fiss-planner`, used alone with its defaults.
 
     python tests/acceptance/package_alone.py
 
@@ -61,7 +61,7 @@ def leader_brakes(kind):
 
 
 def cuts_in(kind, predict):
-    """A car 4 m ahead in the next lane drifts over by 0.8 m/s."""
+    """A car 4 m ahead in the next lane drifts over slowly."""
     plans, road = planner(kind, lanes=2)
     ego, x, y, v, aside = fp.EgoState(50.0, 0.0, 0.0, 13.5, 0.0, 0.0), 54.0, 3.3, 13.0, -0.8
     for t in np.arange(0.0, 5.0, 0.1):

@@ -1,4 +1,4 @@
-"""What searches find with and without the prior, at equal steps: at families, or at places of an invented town.
+"""Finds of searches with and without the prior, at equal steps.
 
     python -m tests.acceptance.prior_search OUT --egos fiss-plus [--scenario low mixed dense] [--seeds 3] [--steps 5000]
     python -m tests.acceptance.prior_search OUT --egos idm-aeb --town
@@ -52,7 +52,7 @@ class Search(NamedTuple):
 
 
 def town() -> list[str]:
-    """Returns the names of the town's places, which it keeps in the library."""
+    """Puts the town's places into the library; returns their names."""
     with tempfile.TemporaryDirectory() as folder:
         extract = Path(folder, "town.osm")
         extract.write_text(osm_town())
@@ -66,7 +66,7 @@ def town() -> list[str]:
 
 
 def play(steps: int, out: Path, search: Search) -> Row:
-    """Plays a run up to a number of steps, or goes on with it; returns what it found."""
+    """Plays or continues a run up to `steps`; returns what it found."""
     folder = out / "-".join(map(str, search))
     if not spent(folder, steps):
         ego = pinned(EgoConfig() if search.ego == "default" else EgoConfig(driver=search.ego))

@@ -1,4 +1,4 @@
-"""`python -m tests.acceptance.readme`: runs the commands of README.md in a fresh clone and compares what they print.
+"""`python -m tests.acceptance.readme`: compares README.md's commands with what a clone prints.
 
 A file is saved first where the page says "Save this as". Numbers, plurals and blanks may differ, since another kind of
 processor plays other episodes. `…` stands for any text. The commands run in one shell, so `source .venv/bin/activate`
@@ -51,14 +51,14 @@ def pattern(line: str) -> str:
 
 
 def agrees(printed: str, shown: tuple[str, ...]) -> bool:
-    """Returns whether the lines were printed in this order; next to each other where no `…` is between."""
+    """Returns whether these lines were printed in order, adjacent unless `…` separates."""
     parts = "\n".join(shown).split("…")
     expressions = [r"\s+".join(pattern(line) for line in part.splitlines() if line.strip()) for part in parts]
     return re.search(".*".join(expressions), printed, re.S) is not None
 
 
 def run(clone: Path, wanted: list[Step]) -> list[str]:
-    """Runs the commands in one shell in a clone; returns what each printed.
+    """Runs the commands in one shell in a clone; returns their outputs.
 
     Raises:
       AssertionError: one ended with a status other than 0.

@@ -1,4 +1,4 @@
-"""A failure in one file, replayed elsewhere; and files that are no such thing."""
+"""Bundles of failures, replayed elsewhere; and files that are no bundles."""
 
 import hashlib
 import io
@@ -34,7 +34,7 @@ Arrays = dict[str, np.ndarray]
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of the first contact of a run, whose folder is somewhere else now."""
+    """Bundle of a run's first contact; the run's folder has moved."""
     folder = tmp_path_factory.mktemp("bundle")
     assert main(["run", *RUN, "--out", str(folder / "run")]) == 0
     contact = read_results(folder / "run").failures[0]
@@ -229,7 +229,7 @@ NET_ARRAY = f"{bundles.SCENARIO}net.xml"
 
 @pytest.fixture(scope="module")
 def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bundle of a contact on a user's map, whose library of places is gone."""
+    """Bundle of a contact on a user's map without its places' library."""
     folder = tmp_path_factory.mktemp("placed")
     net = ["--network", str(NET), "--pattern", "junction", "--place", "from_west"]
     with pytest.MonkeyPatch.context() as patch:
@@ -261,7 +261,7 @@ def without_scenario(arrays: Arrays) -> None:
 
 
 def repack(arrays: Arrays, net: bytes) -> None:
-    """Another net under a name that has its digest, as an attacker would forge it."""
+    """Forges another net under a name that has its digest."""
     text = arrays[f"{bundles.SCENARIO}{library.DOCUMENT}"].tobytes()
     arrays[NET_ARRAY] = np.frombuffer(net, dtype=np.uint8)
     files = {"net.xml": net, library.DOCUMENT: text}

@@ -1,4 +1,4 @@
-"""Replays the inputs of tests/cases through the command line, and compares with what each expects.
+"""Replays the inputs of tests/cases on the command line against expectations.
 
 NAME.expected.yaml stands beside its input, NAME.yaml or a map:
 

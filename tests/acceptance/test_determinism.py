@@ -1,4 +1,4 @@
-"""Same spec, same seed, same results; and a run stopped half-way ends as one that never was."""
+"""Same spec and seed give the same results, also after a stop."""
 
 import os
 import shutil

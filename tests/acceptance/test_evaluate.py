@@ -1,4 +1,4 @@
-"""`risk-sac evaluate` as a user starts it: processes of its own, crashed, interrupted and resumed."""
+"""`risk-sac evaluate` as a user starts it, also crashed, interrupted and resumed."""
 
 import json
 import os
@@ -140,7 +140,7 @@ def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without_figures: None) -> Callable[[int], None]:
-    """Lets the first so many processes of a comparison die as libsumo does."""
+    """Lets the first `times` processes of a comparison die as libsumo does."""
 
     def arrange(times: int) -> None:
         python = tmp_path / "python"

@@ -1,4 +1,4 @@
-"""What is done with failures, done with those of registered egos: one in our process, one in another."""
+"""Failures of registered egos in this and another process, in every use."""
 
 import subprocess
 import sys

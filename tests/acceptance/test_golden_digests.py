@@ -1,4 +1,4 @@
-"""A change that is not meant to change results changes none: small runs come to the digests that were recorded."""
+"""Small runs come to the recorded digests unless results change on purpose."""
 
 import pytest
 

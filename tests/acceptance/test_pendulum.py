@@ -1,4 +1,4 @@
-"""The learner solves a task it was not made for, through nothing but Gymnasium's interface."""
+"""The learner solves a task of another kind through Gymnasium's interface."""
 
 from collections.abc import Iterator
 

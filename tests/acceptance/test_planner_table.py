@@ -1,4 +1,4 @@
-"""The table of what searches find in a planner cuts its runs at equal steps, and compares them."""
+"""Table of finds in a planner: equal steps, ranges and tests."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from tests.builders import collision, episode_record
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run of four episodes of 100 steps, of which the last two are failures."""
+    """Run of four episodes of 100 steps, the last two failures."""
     safe = [episode_record(index) for index in range(2)]
     failed = [episode_record(index, Outcome.FAILURE, collision=collision()) for index in (2, 3)]
     (tmp_path / EPISODES).write_text("".join(record.model_dump_json() + "\n" for record in safe + failed))

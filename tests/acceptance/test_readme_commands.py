@@ -20,7 +20,7 @@ def test_readme_has_the_two_commands_and_those_of_a_run():
 @pytest.mark.timeout(3600)
 @pytest.mark.skipif(not (Path(sys.prefix) / "bin" / "activate").exists(), reason="needs the .venv of `make install`")
 def test_commands_of_a_run_print_what_readme_shows(tmp_path, monkeypatch):
-    """Those of `make` are left out: `python -m tests.acceptance.readme` runs them too, in half an hour."""
+    """Leaves out `make`, which `python -m tests.acceptance.readme` runs in half an hour."""
     monkeypatch.setenv("PYTHONSAFEPATH", "1")  # helpers too run what is installed, whose functions are compiled
     clone = cloned(tmp_path)
     (clone / ".venv").symlink_to(sys.prefix)

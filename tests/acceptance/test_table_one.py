@@ -11,7 +11,7 @@ from risk_sac.search.prior.policy import PolicyLayout
 
 
 def row(method: str, seed: int, ecr: float, dispersion: float | None) -> Row:
-    """A run's figures; those of Table I and what is told beside them."""
+    """Figures of a run: those of Table I and those beside them."""
     others = {"uniform_ecr": 0.1, "efficiency": 0.5, "cost_rate": 0.2, "pcr": 0.0, "distinct": 3}
     windows = {"ecr_100": 0.2, "ecr_200": 0.4, "ecr_300": 0.6}
     figures = {"ecr": ecr, "dispersion": dispersion}

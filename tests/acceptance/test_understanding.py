@@ -1,4 +1,4 @@
-"""Real failures: replayed, bundled, minimised, their regions, their twins, and played against other egos."""
+"""Real failures: replays, bundles, cores, regions, twins, and other egos."""
 
 import shutil
 import subprocess
@@ -50,7 +50,7 @@ def failures(run: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def failure(failures: Path) -> Path:
-    """The first that is no needle: of one that is, hardly anything can be taken away."""
+    """The first failure whose copies fail too, so that it can shrink."""
     for file in sorted(failures.iterdir()):
         stage = VariantPlayer(read_bundle(file))
         with closing(stage.env):

@@ -1,4 +1,4 @@
-"""A violation without contact, of a requirement of the user's own, in everything that works on a failure."""
+"""Violation without contact, of a user's requirement, in every use of failures."""
 
 import io
 import json
@@ -31,7 +31,7 @@ requirements: [{name: never_fast, formula: "ego_speed_mps <= 14.5", scale: 2}]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run whose ego breaks the requirement in several episodes, in some of them after a while."""
+    """Run whose ego breaks the requirement in several episodes, sometimes late."""
     folder = tmp_path_factory.mktemp("violations")
     (folder / "spec.yaml").write_text(SPEC)
     assert main(["run", "--spec", str(folder / "spec.yaml"), "--out", str(folder / "run")]) == 0

@@ -1,4 +1,4 @@
-"""The real worker, told to stop, killed, stopped and refused by the disk: its run comes to the same results."""
+"""A real worker stopped, killed or refused by the disk: same results."""
 
 import resource
 import signal
@@ -50,7 +50,7 @@ class Launcher:
         self.executor.submit(1, self.spec, self.folder, 1)
 
     def work(self, until: int | None = None, then: Do | None = None) -> tuple[list[Event], Exited, float]:
-        """What one worker says, why it is gone, and how long that took after something was done to it.
+        """Returns a worker's messages, its end, and the time since `then`.
 
         Args:
           until: episodes that it tells of before something is done to it.
@@ -84,7 +84,7 @@ def launcher(tmp_path: Path) -> Launcher:
 
 
 def digest(launcher: Launcher) -> str:
-    """What the run comes to if it is left alone from here on."""
+    """Returns the run's digest if it is undisturbed from here on."""
     said, exited, _ = launcher.work()
     assert exited == Exited(None, Cause.ENDED, 0), exited
     assert isinstance(said[-1], Finished)

@@ -1,4 +1,4 @@
-"""The commands of the egos' walkthrough, as they stand there, against the real service."""
+"""Commands of the egos' walkthrough, as written, against the real service."""
 
 import os
 import re

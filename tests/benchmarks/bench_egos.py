@@ -1,4 +1,4 @@
-"""What a step costs with an ego that drives itself, against SUMO's driver: interleaved, as ratios and milliseconds.
+"""Cost of a step with registered egos, relative to SUMO's driver, interleaved.
 
 The promise: an ego in our process at most 20 % over SUMO's, what it thinks itself apart; a remote one on loopback at
 most 0.5 ms more than the same ego in our process, if it is compiled: in Python a bare echo by gRPC takes nearly all of
@@ -44,7 +44,7 @@ def registered(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Iterator[None]:
 
 
 def ms_per_step(env: RiskSacEnv, seed: int) -> Took | None:
-    """Of an episode with random actions, without its beginning and its contact; None if its scene is refused."""
+    """Times an episode without begin and contact; None if refused."""
     rng, cpu, real, steps = np.random.default_rng(seed), 0.0, 0.0, 0
     try:
         env.reset(seed=seed)

@@ -1,4 +1,4 @@
-"""What the closed loop costs beside the simulator, and whether it can run for a long time."""
+"""Cost of the closed loop beside the simulator, and long runs."""
 
 import gc
 import re
@@ -68,7 +68,7 @@ def actions_of(env: RiskSacEnv, seed: int, steps: int) -> list[np.ndarray]:
 
 
 def record(env: RiskSacEnv, seed: int, actions: list[np.ndarray]) -> tuple[list[Call], list[list[Call]]]:
-    """The libsumo calls of one episode: those that set it up, and those of each step."""
+    """Returns an episode's libsumo calls: those of setup, and of each step."""
     calls: list[Call] = []
     with recording(calls):
         env.reset(seed=seed)
@@ -104,7 +104,7 @@ def cpu_of_calls(setup: list[Call], steps: list[list[Call]]) -> float:
 
 
 class StepCost:
-    """Processor time of the steps of some episodes, and of their libsumo calls alone."""
+    """Processor time of some episodes' steps, and of their libsumo calls alone."""
 
     def __init__(self, env: RiskSacEnv) -> None:
         self._env, self._episodes = env, []
@@ -155,7 +155,7 @@ def test_a_step_costs_at_most_three_and_a_half_times_its_libsumo_calls(family: s
 
 
 def crowd(adversaries: int) -> Scenario:
-    """A motorway with adversaries ahead of the ego, in three lanes by turns."""
+    """Motorway with adversaries ahead of the ego, in three lanes by turns."""
     actors = {
         f"other{k}": {
             "start": {"beside": "ego", "ahead_m": f"{30 + 25 * (k // 3)} + ahead_m", "lanes_left": k % 3 - 1},

@@ -1,4 +1,4 @@
-"""Updates of the pretraining's learner on a GPU, as one CUDA graph and kernel by kernel, sampling included."""
+"""Updates of the pretraining's learner as one CUDA graph and by kernels."""
 
 from collections.abc import Callable
 from time import perf_counter

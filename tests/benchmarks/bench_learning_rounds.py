@@ -1,4 +1,4 @@
-"""How fast rounds are beside one episode at a time, and how much of it a learner's updates take."""
+"""Speed of rounds against single episodes, and the learner's share of it."""
 
 import time
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a step of a planner of others costs: processor time of `act`, and within it of the package's own `step()`.
+"""Cost of a planner's step: processor time of `act` and package `step()`.
 
 Random search plays 8 episodes of each family. A step without a plan is one that the package reports as degraded,
 fallback or emergency.
@@ -24,7 +24,7 @@ WANTED_MS = 3.0  # mean of `act`
 
 
 class Times:
-    """Milliseconds of each `act`, and of the package's step with a plan and without."""
+    """Milliseconds of each `act`, and of the package's steps with(out) a plan."""
 
     def __init__(self) -> None:
         self.act: list[float] = []

@@ -1,4 +1,4 @@
-"""Risk-guided replay against the obvious one, a cumulative sum and a binary search, and against a uniform one."""
+"""Risk-guided replay against a cumulative sum with binary search, and uniform replay."""
 
 import numpy as np
 import pytest

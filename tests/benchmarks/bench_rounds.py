@@ -1,4 +1,4 @@
-"""How much faster rounds are with more processes, beside what this machine can do.
+"""Speed of rounds with more processes, beside what this machine can do.
 
 With an ego that waits 20 ms a step the processes hardly need processors: 16 of them are to be 14 times as fast as one.
 That takes two idle cores, since a step of the simulation takes one about 2 ms.
@@ -53,7 +53,7 @@ class Watch(Listener):
 
 
 def steps_per_s(folder: Path, processes: int, budget: Budget, ego: EgoConfig, warm: int) -> float:
-    """Environment steps of an archive search per second, without the first `warm` episodes."""
+    """Environment steps per second of an archive search after `warm` episodes."""
     os.environ[ROLLOUTS] = str(processes)
     watch = Watch(warm)
     execute_run(RunSpec(family="low", method="archive", seed=3, ego=ego, budget=budget), folder, watch)
@@ -61,7 +61,7 @@ def steps_per_s(folder: Path, processes: int, budget: Budget, ego: EgoConfig, wa
 
 
 def bare_steps_per_s(processes: int) -> float:
-    """Steps per second of so many simulations that nothing else is done with."""
+    """Steps per second of `processes` simulations that do nothing else."""
     with ExitStack() as stack:
         started = [
             stack.enter_context(

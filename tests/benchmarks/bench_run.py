@@ -1,4 +1,4 @@
-"""Where a run's time goes: all but the simulator and the learner should be next to nothing."""
+"""Time of a run outside simulator and learner: next to nothing."""
 
 import time
 from collections.abc import Callable

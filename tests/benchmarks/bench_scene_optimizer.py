@@ -1,4 +1,4 @@
-"""Processor time of an ask and a tell: bounded, however many scenes there are.
+"""Processor time of an ask and a tell, bounded over many scenes.
 
 Run: python -m pytest tests/benchmarks/bench_scene_optimizer.py -m bench -s
 """

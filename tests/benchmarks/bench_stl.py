@@ -1,4 +1,4 @@
-"""Measures one update of the shipped requirements, and an episode of the worst formula that is accepted."""
+"""Cost of a monitor update, and of the worst accepted formula's episode."""
 
 import time
 import timeit

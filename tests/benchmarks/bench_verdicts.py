@@ -1,4 +1,4 @@
-"""What judging one contact costs, once everything is compiled: rules, conflict, six drivers, labels, names.
+"""Cost of judging one contact once compiled: rules, conflict, drivers, labels, names.
 
 Processor time: it is one thread, and others use the machine too.
 """

@@ -1,7 +1,7 @@
-"""One learner update beside Stable-Baselines3's; a program of its own, because torch's threads are fixed at the start
-of a process.
+"""One learner update beside Stable-Baselines3's, in a process of its own.
 
-Run: OMP_NUM_THREADS=1 python -m tests.benchmarks.sac_update 256 256; prints the times as JSON.
+Run: OMP_NUM_THREADS=1 python -m tests.benchmarks.sac_update 256 256; prints the times as JSON. Torch's threads are
+fixed at the start of a process.
 """
 
 import json

@@ -18,7 +18,7 @@ class Times:
 
 
 def interleaved(*calls: Callable[[], object], rounds: int, repeats: int = 1) -> Times:
-    """Times the calls by turns, so that they meet the same machine; a time is the mean of `repeats` in a row."""
+    """Times the calls by turns; each time is the mean of `repeats`."""
     times = Times(wall_s=np.empty((rounds, len(calls))), cpu_s=np.empty((rounds, len(calls))))
     for turn in np.ndindex(times.wall_s.shape):
         call = calls[turn[1]]

@@ -63,7 +63,7 @@ def hear(line: bytes) -> Heard:
 
 
 class Runs:
-    """An executor at work: the program of a run is the code that was submitted for it."""
+    """Executor at work; a run's program is the code submitted for it."""
 
     def __init__(self, make: MakeExecutor, folder: Path, **patience: Any) -> None:
         self._folder = folder

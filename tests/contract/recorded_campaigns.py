@@ -1,4 +1,4 @@
-"""Campaigns at a known time, of known ids, put into a database and a data folder as the manager and workers do it."""
+"""Campaigns of known times and ids, written as manager and workers do."""
 
 import itertools
 import math
@@ -122,7 +122,7 @@ def finished(spec: RunSpec, done: Sequence[EpisodeRecord]) -> FinishedRun:
 
 
 def series_arrays() -> dict[str, np.ndarray]:
-    """Three steps of two actors, one of which is absent in the second step."""
+    """Three steps of two actors, one absent in the second step."""
     rows = np.arange(6, dtype=float).reshape(3, 2)
     rows[1, 1] = np.nan
     return dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows) | {
@@ -145,7 +145,7 @@ def series_arrays() -> dict[str, np.ndarray]:
 
 
 class Clock:
-    """The time of day, which stands still until it is told to pass."""
+    """Time of day that stands still until it is told to pass."""
 
     def __init__(self) -> None:
         self.now = BEGAN
@@ -156,7 +156,7 @@ class Clock:
 
 @contextmanager
 def known_times_and_ids() -> Iterator[Clock]:
-    """Within it, what the service notes of time and makes up as ids is known beforehand."""
+    """Makes times and ids of the service known within the body."""
     clock, ids = (
         Clock(),
         itertools.chain((ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID), map("{:016x}".format, itertools.count())),
@@ -178,7 +178,7 @@ class Recorded:
         self._ledger = Ledger(self._store)
 
     def write(self) -> None:
-        """One campaign that has ended, one at work, and one that was cancelled while it waited."""
+        """Writes three campaigns: one ended, one at work, one cancelled while waiting."""
         self._ended()
         self._live()
         cancelled = self._ledger.create(CampaignSpec(families=("dense",), methods=("random",), label="cancelled"))
@@ -188,7 +188,7 @@ class Recorded:
         self._store.close()
 
     def _ended(self) -> None:
-        """One run has found failures, one of its workers died; the other run has failed."""
+        """One run found failures after losing a worker; the other failed."""
         campaign = self._create("ended", episodes=len(FOUND), evaluation=2)
         first, second = campaign.runs
         done = records(FOUND, "f.")
@@ -204,7 +204,7 @@ class Recorded:
         self._ledger.end_run(second.number, State.FAILED, "worker exited with status 1: Traceback: the policy is NaN")
 
     def _live(self) -> None:
-        """One run is at work, the other one has its episodes to come."""
+        """One run is at work, the other has its episodes to come."""
         campaign = self._create("live", episodes=len(NOTHING), evaluation=0)
         first, _ = campaign.runs
         self._ledger.start_run(first.number)

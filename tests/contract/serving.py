@@ -1,4 +1,4 @@
-"""The real app on a real socket, with an executor that starts nothing."""
+"""The real app on a socket, with an executor that starts nothing."""
 
 import math
 import os

@@ -25,7 +25,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 class Reused(RayExecutor):
-    """One for all tests, since another client of Ray costs several seconds of a processor."""
+    """Executor for all tests: another Ray client costs seconds of a processor."""
 
     def begin_anew(self, program: WorkerProgram) -> "Reused":
         self._program, self._messages, self._orders = program, queue.SimpleQueue(), {}

@@ -1,4 +1,4 @@
-"""Requests that follow the API's description and requests that do not; every answer must follow it.
+"""Requests within and outside the API's description; every answer must follow it.
 
 RISK_SAC_SCHEMATHESIS_CASES=20000 tries so many over all routes.
 """

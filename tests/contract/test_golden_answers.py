@@ -1,4 +1,4 @@
-"""Whole answers of the main routes about known campaigns: status, headers and body.
+"""Whole answers of the main routes about known campaigns, headers included.
 
 The recorded answers are `golden/*.json`. After a change of an answer on purpose record it again and review the diff:
 
@@ -53,7 +53,7 @@ BODIES = {"post": POSTED, "check_bad_formula": POSTED | {"requirements": [WRONG]
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
-    """A client of a service that has known campaigns, and has put those at work to work again."""
+    """Client of a service whose known campaigns at work run again."""
     settings = ServiceSettings(data_dir=tmp_path_factory.mktemp("golden"), max_workers=2)
     with known_times_and_ids() as clock:
         Recorded(settings, clock).write()
@@ -92,7 +92,7 @@ def test_failures_and_episodes_are_filtered_by_requirement(client):
 
 
 def choices(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
-    """Each parameter of a GET that takes one of several values: path, parameter and its schema."""
+    """Yields GET parameters with several values: path, parameter and its schema."""
 
     def resolved(node: dict[str, Any]) -> dict[str, Any]:
         while "$ref" in node:
@@ -135,7 +135,7 @@ TESTED_APART = (
 
 
 def shown(response: httpx.Response) -> dict[str, Any]:
-    """What is compared of a response; a body that is no JSON as its lines."""
+    """Returns what is compared of a response; non-JSON bodies as lines."""
     headers = {name: response.headers[name] for name in HEADERS if name in response.headers}
     if "json" in headers.get("content-type", ""):
         body = response.json()

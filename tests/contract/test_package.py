@@ -1,4 +1,4 @@
-"""What the wheel contains, what the server process loads, and nets that are built again."""
+"""Contents of the wheel, modules that the server loads, and rebuilt nets."""
 
 import json
 import os
@@ -22,7 +22,7 @@ MADE = ("node_modules", "dist")  # beside the page's sources, by an installation
 
 @pytest.fixture(scope="module")
 def contents(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
-    """Names in a wheel built from a copy: building in the tree would leave files there."""
+    """Returns the names in a wheel, built from the tree's copy."""
     source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for package in PACKAGES:
         shutil.copytree(ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__", *MADE))

@@ -1,4 +1,4 @@
-"""Pages link to what exists, stay short, and name signals, requirements and patterns as the code does."""
+"""Pages link to existing files, stay short, and use the code's names."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""The picture of a contact over REST, by the client and from a terminal: a real server with known campaigns."""
+"""Pictures of contacts over REST, client and terminal, of known campaigns."""
 
 import json
 import secrets
@@ -64,14 +64,14 @@ def stubbed_folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def stubbed(stubbed_folder) -> Iterator[httpx.Client]:
-    """Of a service whose pictures are never really drawn; each test asks for other ones."""
+    """Client of a service with stubbed drawing; tests ask for different pictures."""
     with recorded(ServiceSettings(data_dir=stubbed_folder, max_workers=1)) as client:
         yield client
 
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """Stands for the drawing of pictures: each is there as soon as its gate is open."""
+    """Replaces the drawing of pictures: each is ready when its gate opens."""
     begun, gate = [], threading.Event()
 
     def drawing(family, recording, format_, twin):
@@ -136,7 +136,7 @@ def test_a_contact_whose_series_is_lost_or_damaged_has_no_picture_and_says_so(st
 
 
 def others(client) -> list[str]:
-    """Where pictures are, but for that of the contact whose series a test damages."""
+    """Paths of pictures, except of the contact whose series is damaged."""
     return [f"{FOLDER}/{failure}/picture.png" for failure in ids(client) if failure != f"{RUN}-search-2"]
 
 

@@ -1,4 +1,4 @@
-"""In the checkers' environment: what ASAM's checkers find in files, as JSON; each check with its state and findings."""
+"""In the checkers' environment: prints findings of ASAM's checkers, as JSON."""
 
 import json
 import logging

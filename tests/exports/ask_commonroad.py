@@ -1,4 +1,4 @@
-"""In the checkers' environment: whether vehicles' trajectories are feasible for the checker's point mass, as JSON."""
+"""In the checkers' environment: prints whether trajectories are feasible, as JSON."""
 
 import json
 import sys

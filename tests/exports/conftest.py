@@ -1,4 +1,4 @@
-"""One failure of each family, exported once a session; and the readers that are not ours."""
+"""One exported failure of each family, and the readers of other projects."""
 
 import os
 import subprocess
@@ -37,7 +37,7 @@ def failure() -> Callable[[str], Recorded]:
 
 @pytest.fixture(scope="session")
 def exported(failure: Callable[[str], Recorded], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """A family's failure in a format: the file, or the folder of several."""
+    """Exports a family's failure in a format: the file, or a folder."""
     folder = tmp_path_factory.mktemp("exports")
 
     def of(family: str, name: FormatName) -> Path:

@@ -1,4 +1,4 @@
-"""`python -m tests.exports.make_examples`: writes the examples, one for each format, and the bundles of the tests.
+"""`python -m tests.exports.make_examples`: writes an example per format, and test bundles.
 
 The bundles say what is played; the episodes are those of a short search. `risk_sac/scenario/README.md`
 shows the pictures of the families.
@@ -27,7 +27,7 @@ SEARCH = ("--scenario", "mixed", "--method", "archive", "--episodes", "60", "--s
 
 
 def played_here(bundle: Bundle) -> Bundle:
-    """Plays a bundle; with the same code and kind of processor the result is the same."""
+    """Plays a bundle; same code and processor give the same result."""
     manifest = bundle.manifest
     with closing(RiskSacEnv.of(manifest.spec)) as env:
         played = replay(env, manifest.episode, bundle.series)

@@ -1,4 +1,4 @@
-"""In the checkers' environment: checks a scenario by its schema; prints what commonroad-io reads in it, as JSON."""
+"""In the checkers' environment: validates a scenario and prints it, as JSON."""
 
 import json
 import sys

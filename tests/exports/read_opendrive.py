@@ -1,4 +1,4 @@
-"""A reader of OpenDRIVE that shares nothing with the writer: the middles of all lanes, with heights."""
+"""Independent reader of OpenDRIVE: the middles of all lanes, with heights."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ def reference(road: ET.Element, s: float) -> tuple[float, float, float]:
 
 
 def middles(root: ET.Element, step_m: float = 0.2) -> list[np.ndarray]:
-    """The middle of each lane to the right of its road's reference line, `k x 3`."""
+    """Returns lanes' middles, right of each road's reference line, `k x 3`."""
     found = []
     for road in root.iter("road"):
         length, lanes = float(road.attrib["length"]), list(road.iterfind("lanes/laneSection/right/lane"))

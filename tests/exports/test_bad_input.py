@@ -1,4 +1,4 @@
-"""What cannot be exported, and disks that refuse: a clear error, and nothing half-written."""
+"""Failed exports and refusing disks: a clear error, and nothing half-written."""
 
 import json
 import resource
@@ -80,7 +80,7 @@ def test_a_bundle_that_lacks_an_array_or_a_violation_is_refused(tmp_path, capsys
 
 
 def small_disk() -> None:
-    """Files of this process may have 20 kB; to write more fails, as on a full disk."""
+    """Limits files of this process to 20 kB, as a full disk."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 

@@ -1,4 +1,4 @@
-"""Every body of the table, exported in every format of a failure and drawn."""
+"""Every body of the table, drawn, and exported in every failure format."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Callable

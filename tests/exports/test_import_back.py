@@ -1,4 +1,4 @@
-"""What is exported to OpenSCENARIO is imported to the same start and the same motion."""
+"""OpenSCENARIO exports are imported back to the same start and motion."""
 
 import math
 import xml.etree.ElementTree as ET

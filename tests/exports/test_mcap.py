@@ -1,4 +1,4 @@
-"""MCAP, read by the mcap package and by the schemas that lie in the file."""
+"""MCAP, read by the mcap package and the file's own schemas."""
 
 import io
 import json

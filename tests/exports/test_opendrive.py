@@ -1,4 +1,4 @@
-"""Exports of nets with heights, read back: lanes and bodies are where SUMO has them, and no link leads nowhere."""
+"""Exports of nets with heights: lanes, bodies and links as in SUMO."""
 
 import subprocess
 import sys

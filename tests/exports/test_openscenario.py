@@ -34,7 +34,7 @@ def test_asams_checkers_find_nothing(exported):
 
 
 def driven(file: Path, actor: ExportedActor) -> np.ndarray:
-    """Times and middles of a body, `frames x 3`, as a reader of the standard has them."""
+    """Returns times and middles of a body, `frames x 3`."""
     root = etree.parse(file).getroot()
     (trajectory,) = (each for each in root.iter("Trajectory") if each.get("name") == f"{actor.id} recorded")
     (thing,) = (each for each in root.iter("ScenarioObject") if each.get("name") == actor.id)

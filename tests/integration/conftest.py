@@ -28,7 +28,7 @@ def scripted() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """One server for all tests that look at nothing but what they posted themselves."""
+    """Starts a server for tests that read only what they posted."""
     with servers(tmp_path_factory.mktemp("scripted")) as start:
         yield start()
 
@@ -82,7 +82,7 @@ class Inside(Service):
 
 @pytest.fixture
 def serve_inside(tmp_path: Path) -> Iterator[Callable[..., Inside]]:
-    """Starts servers within this process and stops them at the end of the test."""
+    """Starts servers within this process and stops them after the test."""
     with ExitStack() as stack:
 
         def start(**settings: object) -> Inside:
@@ -96,7 +96,7 @@ def serve_inside(tmp_path: Path) -> Iterator[Callable[..., Inside]]:
 
 @pytest.fixture
 def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[..., Service]]:
-    """Starts servers and stops them at the end of the test; on PostgreSQL where the parameter says so."""
+    """Starts servers and stops them after the test; PostgreSQL by the parameter."""
     with servers(tmp_path, **database(request)) as start:
         yield start
 
@@ -111,7 +111,7 @@ def serve_shared(
 
 
 def database(request: pytest.FixtureRequest) -> dict[str, str]:
-    """The setting of a new database of the kind that the parameter names."""
+    """Returns the setting of a new database of the parameter's kind."""
     if getattr(request, "param", "sqlite") == "postgresql":
         return {"database_url": request.getfixturevalue("postgresql").new_database()}
     return {}

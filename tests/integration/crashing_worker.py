@@ -1,4 +1,4 @@
-"""The real worker with a simulator that reads address 0 in the eighth step of each run's third episode."""
+"""Real worker whose simulator reads address 0 in episode three, step eight."""
 
 import ctypes
 import sys

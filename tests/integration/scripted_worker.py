@@ -1,4 +1,4 @@
-"""A worker that speaks the real protocol and does what its run's seed says.
+"""Worker with the real protocol that behaves as its run's seed says.
 
 Runs as `python -m scripted_worker FOLDER NICENESS` in place of `risk_sac.execution.worker`.
 """
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def keep(checkpoint: Path, done: int) -> None:
-    """In one step, as the real worker: it may be killed at any moment."""
+    """Writes atomically, as the real worker: it may be killed any time."""
     new = checkpoint.with_suffix(".new")
     new.write_text(str(done))
     new.replace(checkpoint)

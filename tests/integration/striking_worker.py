@@ -1,6 +1,7 @@
-"""The scripted worker, but in every second episode the ego fails, and every third failure repeats the one before.
+"""Scripted worker with a failure in every second episode.
 
-Those in episodes 1, 7, 13, … are preventable, and driven by a script; the others are driven at random.
+Every third failure repeats the one before. Those in episodes 1, 7, 13, … are preventable, and driven by a script; the
+others are driven at random.
 """
 
 import scripted_worker

@@ -39,7 +39,7 @@ PUBLIC = {"/", "/page", "/healthz", "/readyz", "/openapi.json", "/docs"}
 
 
 def scope_of(method, path):
-    """The scope that a route wants by the rule; none where anybody may call it."""
+    """Returns the scope that a route requires by rule; None if public."""
     if path in PUBLIC:
         return None
     return Scope.ADMIN if path == "/metrics" else Scope.READ if method == "GET" else Scope.RUN
@@ -56,7 +56,7 @@ every_route = pytest.mark.parametrize(("path", "method"), ROUTES, ids=lambda par
 
 @pytest.fixture(scope="module")
 def world(serve_shared, scripted, tmp_path_factory):
-    """A server that other machines may reach, with keys of two projects and a campaign that waits in its middle."""
+    """Server open to other machines, with two projects' keys and a campaign."""
     folder = tmp_path_factory.mktemp("world")
     file = KeyFile(folder / "keys.json")
     holders = {
@@ -104,7 +104,7 @@ def post_scenario(service):
 
 
 def ask(world, method, path, key=None, known=True, **headers):
-    """Returns a route's answer to the holder of a key; of a stream, its beginning."""
+    """Returns a route's answer to a key's holder; of streams the beginning."""
     ids = (world.campaign, world.network, world.scenario) if known else (UNKNOWN,) * 3
     parts = {"campaign_id": ids[0], "network_id": ids[1], "scenario": ids[2], "failure_id": world.failure}
     parts |= {"regression_id": f"{ids[0]}-{'0' * 16}", "twin": "idle", "run_id": world.run}

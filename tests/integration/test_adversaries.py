@@ -1,4 +1,4 @@
-"""Adversaries that can exist on a road, measured from the bodies that SUMO drove."""
+"""Adversaries stay physically possible, measured from bodies that SUMO drove."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -24,7 +24,7 @@ NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 
 
 def actions(seed: int, size: int) -> Iterator[Floats]:
-    """Endless joint actions: uniform, drawn to a bias, bang-bang, or flat out, by turns."""
+    """Yields endless joint actions: uniform, biased, bang-bang or flat out, by seed."""
     g = np.random.default_rng(seed)
     value, bias = np.ones(size), g.uniform(-1, 1, size)
     while True:

@@ -1,4 +1,4 @@
-"""Calling a real server: retries, lists, what is polled, answers that are kept, and the reasons of refusals."""
+"""Calls of a real server: retries, lists, polling, caching, and refusals."""
 
 import asyncio
 import json
@@ -11,7 +11,7 @@ SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 3}}
 
 
 async def post_at_once(port, keys, spec=SPEC):
-    """Post the same campaign with each key, all on connections that are open at the same time: statuses and bodies."""
+    """Posts a campaign with each key concurrently; returns statuses and bodies."""
     body = json.dumps(spec).encode()
 
     async def post(key):

@@ -1,4 +1,4 @@
-"""What a user can get wrong, and what the service says to it."""
+"""Mistakes that users can make, and what the service answers."""
 
 import json
 

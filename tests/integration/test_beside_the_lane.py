@@ -1,4 +1,4 @@
-"""Where SUMO, its drivers and the ego itself have an ego that is not on the lane that it began on, from either side."""
+"""Egos beside their first lane, on either side: SUMO's and drivers' view."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -168,7 +168,7 @@ def test_an_ego_s_path_stays_that_of_its_first_lane(sim, pilot, beside_m):
 def test_who_comes_beside_an_ego_that_stands_askew_stops_for_it_only_if_drivers_are_wary(
     sim, pilot, own_m, beside_m, speed_mps, wary
 ):
-    """Its front is in the middle of its lane and its tail in the one beside it."""
+    """Its front is in its lane, its tail in the one beside."""
     towards = math.copysign(1.0, beside_m - own_m)
     pilot.motion = lambda time_s: Motion(150.0, own_m + towards * 1.15, -towards * math.radians(30.0), 0.0)
     own, beside = (2, 1) if own_m > beside_m else (1, 2)
@@ -183,7 +183,7 @@ CUT_IN = Genes(active=1.0, place=0.7, aside=0.3, cue=0.4, drive=0.5, steer=1.0, 
 
 
 def cut_in(sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lateral places of an ego that drives from one lane to another, and of a neighbour that cuts in by a script."""
+    """Lateral places of an ego and of a neighbour that cuts in."""
     low = FAMILIES["low"]
     id_ = "right" if beside < begins else "left"
     lanes = {"lead": (begins, 400.0), id_: (beside, 300.0), "left" if id_ == "right" else "right": (beside, 200.0)}
@@ -212,7 +212,7 @@ def cut_in(sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int
 
 @pytest.mark.parametrize(("begins", "ends", "beside"), [(2, 2, 1), (1, 1, 0), (1, 2, 0)])
 def test_a_neighbour_cuts_in_to_the_lane_where_the_ego_is(sim, pilot, begins, ends, beside):
-    """Whichever lane that is, and the same from the left and from the right."""
+    """It does so in any lane, and alike from left and right."""
     ego_m, other_m = cut_in(sim, pilot, begins, ends, beside)
     assert abs(other_m[-1] - ego_m[-1]) < 1.0
     assert abs(other_m[27] - ego_m[27]) > 1.8  # before its cue it is beside the ego

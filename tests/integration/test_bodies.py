@@ -1,4 +1,4 @@
-"""Every row of the table of bodies, spawned in SUMO, driven, seen and stopped for."""
+"""Every row of the table of bodies, spawned, driven, seen and respected."""
 
 import math
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ def problem_with(
     statics: Sequence[StaticStart] = (),
     ego: EgoConfig | None = None,
 ) -> Problem:
-    """The mixed family's problem with other actors; the ego starts in the right lane, 10 m/s."""
+    """Problem of mixed with other actors; the ego drives at 10 m/s."""
     base = Problem.from_spec(RunSpec(family="mixed", method="random", seed=0, ego=ego or EgoConfig()))
     start = VehicleStart(id="ego", role=Role.EGO, route=ROUTE, lane=1, position_m=100.0, speed_mps=10.0)
 

@@ -1,4 +1,4 @@
-"""The boundary of an ego in a story: the method, its map, and what it refuses."""
+"""Boundary of an ego in a story: method, map, and refusals."""
 
 from pathlib import Path
 

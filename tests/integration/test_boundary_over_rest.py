@@ -1,4 +1,4 @@
-"""The map of a boundary over REST and from the command line: real server, real worker."""
+"""Boundary map over REST and on the command line, with real workers."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Campaigns on a real server, with workers that do what the test needs."""
+"""Campaigns on a real server, with workers scripted by the test."""
 
 import os
 import signal
@@ -52,7 +52,7 @@ def test_a_campaign_runs_to_its_end_and_can_be_read(shared):
 
 @pytest.fixture(scope="module")
 def broken(shared, scripted):
-    """A campaign with runs whose workers break in a row, each in its way, and one that nothing is wrong with."""
+    """Campaign with runs whose workers break repeatedly, and one sound run."""
     faults = [scripted.DIES, scripted.BABBLES, scripted.EXITS]
     return shared.wait(shared.post(seeds=[*faults, scripted.WELL_BEHAVED], budget={"episodes": 8}))
 

@@ -39,7 +39,7 @@ def call(service: Service, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int
 
 @pytest.fixture
 def answer(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
-    """The JSON document that a command prints, which is all that it prints."""
+    """Returns the JSON document that is all that a command prints."""
 
     def answered(*arguments: object, status: int = 0) -> Any:
         capsys.readouterr()
@@ -50,7 +50,7 @@ def answer(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> Call
 
 
 def newest(answer: Callable[..., Any]) -> list[str]:
-    """The campaign queued last, if there is one; what is told of it changes while it runs."""
+    """Returns the id of the campaign queued last, if there is one."""
     return [campaign["id"] for campaign in answer("list", "--limit", 1)]
 
 

@@ -1,4 +1,4 @@
-"""Whatever a campaign may ask for gives finite figures: every number has bounds, and real runs at them stay finite."""
+"""Every number of a campaign has bounds, and runs there stay finite."""
 
 import functools
 import itertools
@@ -53,7 +53,7 @@ class Number(NamedTuple):
 
 
 def numbers(node: dict[str, Any], path: str = "") -> Iterator[Number]:
-    """Every number below a node of the schema; entries of a list under the list's own name."""
+    """Yields every number below a schema node; list entries by list name."""
     node = next((option for option in node.get("anyOf", []) if option.get("type") != "null"), node)
     if "$ref" in node:
         node = schema()["$defs"][node["$ref"].rpartition("/")[2]]
@@ -113,7 +113,7 @@ def campaign(changes: dict[str, Any], family: str = "low", method: str = "risk-s
 
 
 def play(spec: RunSpec, folder: Path) -> None:
-    """A run in which nothing that is stored, told or learnt is infinite or no number."""
+    """Plays a run, and checks that it stores and learns finite numbers."""
     torch.set_num_threads(1)
     folder.mkdir()
     run = RunState(spec, folder)
@@ -155,7 +155,7 @@ def assert_finite(state: Any) -> None:
     [corner if corner in IN_TIME else pytest.param(corner, marks=pytest.mark.torture) for corner in range(CORNERS)],
 )
 def test_a_run_with_floats_at_their_bounds_stays_finite(corner: int, tmp_path: Path) -> None:
-    """Over all corners each float is at its low end, at its high end and at its default equally often."""
+    """Over all corners, low end, high end and default are equally frequent."""
     ends = {}
     for number in FLOATS:
         place = np.random.default_rng(list(number.path.encode())).permutation(CORNERS)[corner] % 3
@@ -174,7 +174,7 @@ def test_a_run_with_equipment_at_its_bounds_stays_finite(end: str, tmp_path: Pat
 
 
 def odds() -> Iterator[tuple[str, float, float]]:
-    """Narrow and wide intervals at the ends of what is sensible, and about nothing."""
+    """Yields narrow and wide intervals at sensible ends and about 0."""
     for path, sensible in SENSIBLE.items():
         ends = (sensible.low, -5e-324, 0.0, 5e-324, sensible.high)
         yield from ((path, low, high) for low, high in itertools.combinations_with_replacement(sorted(ends), 2))

@@ -1,4 +1,4 @@
-"""A leader that hides a standing car and leaves its lane late: the cut-out of UN R157's scenarios."""
+"""Cut-out of UN R157: a leader hides a standing car, leaves late."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -25,7 +25,7 @@ def env(request: pytest.FixtureRequest) -> Iterator[RiskSacEnv]:
 
 
 def played(env: RiskSacEnv, *, left: bool) -> tuple[list[Frame], Collision | None]:
-    """A fast scene; the leader leaves to the side where no vehicle is."""
+    """Plays a fast scene; the leader leaves to the free side."""
     space, follower = env.problem.space, ScriptFollower(env.problem.family)
     unit = np.full(space.dimension, 0.5)
     unit[space.names.index("ego_speed_mps")] = 1.0

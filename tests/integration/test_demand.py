@@ -1,4 +1,4 @@
-"""What a run is said to take of memory, beside what a learner and its checkpoint really take."""
+"""Estimated memory of a run, beside what learner and checkpoint take."""
 
 import json
 import subprocess

@@ -47,7 +47,7 @@ def connect():
 
 
 def ended(connection):
-    """Whether the server closes a connection on which something arrives now and then."""
+    """Whether the server closes a connection that receives a byte occasionally."""
     connection.settimeout(0.1)
     while True:
         try:
@@ -209,7 +209,7 @@ def test_who_reads_nothing_of_an_answer_makes_room_for_others(serve_inside):
 
 
 def established(client):
-    """Whether the server, in this process, still has its end of a connection."""
+    """Whether the server, in this process, still has its connection end."""
     ends = psutil.Process().net_connections("tcp")
     return any(end.raddr == client.getsockname() and end.status == psutil.CONN_ESTABLISHED for end in ends)
 

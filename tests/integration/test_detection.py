@@ -1,4 +1,4 @@
-"""Defects in real episodes: a search detects one, and what shows it is a failure of the defect alone."""
+"""Searches detect a defect by a failure that the defect alone causes."""
 
 import re
 from contextlib import closing

@@ -1,4 +1,4 @@
-"""Earlier runs: those of the command line opened in the service, and campaigns that go on from one."""
+"""Earlier runs: command-line folders in the service, and campaigns that continue one."""
 
 import hashlib
 import os
@@ -38,13 +38,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def root(tmp_path: Path) -> Iterator[Path]:
-    """A folder for runs, removed at the end: what looks into all of a session's runs would wait for a FIFO."""
+    """Folder for runs, removed at the end since a FIFO would block."""
     yield tmp_path / "runs"
     shutil.rmtree(tmp_path / "runs")
 
 
 def repeated(source: Path, out: Path, times: int) -> int:
-    """Writes a run whose episodes are those of another one over and over; returns how many."""
+    """Writes a run that repeats another's episodes; returns how many."""
     results = read_results(source)
     one = records_from_lines((source / EPISODES).read_bytes())
     records = [each.model_copy(update={"index": i}) for i, each in enumerate(one * times)]

@@ -55,7 +55,7 @@ def car(
 
 
 def on_the_mixed_road(ego: VehicleStart, *vehicles: VehicleStart, walker: tuple[float, float] | None = None) -> Layout:
-    """The ego, and at most a few others; a pedestrian stands where told."""
+    """Layout of the ego, a few others, and perhaps a standing pedestrian."""
     standing = () if walker is None else (walker,)
     return replace(
         MIXED,
@@ -70,7 +70,7 @@ def on_the_mixed_road(ego: VehicleStart, *vehicles: VehicleStart, walker: tuple[
 
 
 def drive(run: Driven, layout: Layout, *, seen_from: int = 0, steps: int = 110) -> list[Frame]:
-    """Frames of a run in which `actor` is hidden before step `seen_from`; adversary vehicles keep their speed."""
+    """Frames of a run; `actor` is hidden before `seen_from`, adversaries keep speed."""
     run.told.tell = lambda frame, step: belief_of(frame, hidden=() if step >= seen_from else ("actor",))
     sim = run.sim
     frames = [sim.reset(layout, 1)]
@@ -96,7 +96,7 @@ def peak_braking(frames: list[Frame]) -> float:
 
 
 def dense(*vehicles: VehicleStart) -> Layout:
-    """The ego goes straight on at the intersection from the south, on green."""
+    """The ego crosses the intersection straight from the south, on green."""
     middle = FAMILIES["dense"].layout(DENSE_SPACE.from_unit(np.full(DENSE_SPACE.dimension, 0.5)).values)
     ego = replace(middle.ego, position_m=middle.ego.position_m - 10.0, speed_mps=12.0)
     return replace(middle, ego=ego, vehicles=vehicles, pedestrians=(), signal_offset_s=GREEN_S)
@@ -152,7 +152,7 @@ def test_a_pedestrian_off_the_road_does_not_stop_the_ego(sim: Driven) -> None:
 
 
 def with_a_memory(run: Driven, layout: Layout, x_m: float, y_m: float) -> list[Frame]:
-    """Frames of a run in which the ego believes a standing `actor` to be there, wherever it is."""
+    """Frames of a run whose ego expects a standing `actor` there."""
     run.told.tell = lambda frame, _: belief_of(frame, expected={"actor": (x_m, y_m, 0.0, 0.0, 0.0)})
     return [run.sim.reset(layout, 1), *(run.sim.step() for _ in range(110))]
 
@@ -214,7 +214,7 @@ def test_the_ego_brakes_for_a_vehicle_at_the_junction_that_it_sees(sim: Driven, 
 
 
 def behind_a_braking_leader(config: EgoConfig) -> list[Frame]:
-    """The leader, 20 m ahead at 14 m/s, brakes with 8 m/s² after a second."""
+    """The leader, 20 m ahead at 14 m/s, brakes after a second."""
     low = FAMILIES["low"].layout(FAMILIES["low"].space.from_unit(np.full(9, 0.5)).values)
     ego = replace(low.ego, speed_mps=14.0)
     lead = replace(low.vehicles[0], position_m=ego.position_m + 24.6, speed_mps=14.0, id="actor")

@@ -1,4 +1,4 @@
-"""Egos that drive themselves, in real episodes: in our process, in another one, and when they fail."""
+"""Registered egos in real episodes: in this process, another, and failing."""
 
 import gc
 import json
@@ -50,7 +50,7 @@ class Example:
 
 @pytest.fixture
 def install(tmp_path, monkeypatch):
-    """Installs a package with an ego, as an operator would: a distribution with an entry point."""
+    """Installs a package with an ego: a distribution with an entry point."""
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def installed(body: str = "pass", version: str = "1", summary: str = "An example.") -> None:
@@ -171,7 +171,7 @@ def test_a_shipped_ego_touches_nobody_when_nobody_attacks(family, driver):
 
 
 def test_sumo_s_drivers_see_where_the_ego_is_and_how_fast():
-    """Followers keep their distance from an ego that SUMO does not drive, where lanes end and junctions begin too."""
+    """Followers keep their distance also at lanes' ends and junctions."""
     import libsumo
 
     spec = RunSpec(family="dense", method="random", seed=0, ego=EgoConfig(driver="idm-aeb"))

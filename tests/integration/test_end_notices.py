@@ -1,4 +1,4 @@
-"""A server tells `on_end` of a campaign's end, and refuses a URL that the operator does not allow."""
+"""A server notifies `on_end` of a campaign's end, if the operator allows."""
 
 from contextlib import closing
 

@@ -1,4 +1,4 @@
-"""Each field of an ODD acts or is refused; weather, light and trucks hide what the ego sees."""
+"""Each ODD field acts or is refused; weather, light, trucks limit sight."""
 
 from collections.abc import Mapping
 from contextlib import closing
@@ -29,7 +29,7 @@ each_ego = pytest.mark.parametrize("ego", EGOS, ids=lambda ego: ego.get("driver"
 def play(
     family: str, environment: Mapping[str, Any], ego: Mapping[str, Any], **changes: float
 ) -> list[tuple[Frame, np.ndarray]]:
-    """Frames, and the actors seen in each, of an episode in which all adversaries brake."""
+    """Frames of an episode with braking adversaries, and actors seen in each."""
     spec = RunSpec.model_validate(
         {"family": family, "method": "random", "seed": 0, "ego": ego, "odd": {"environment": environment}}
     )
@@ -120,7 +120,7 @@ REFUSED = ("scenery.lanes", "scenery.speed_limit_mps", "dynamic.actor_kinds")
 
 
 def episodes(odd: Mapping[str, Any]) -> bytes:
-    """Positions of all and actors that the ego saw, with the same seeds, actions and points of the unit cube."""
+    """Positions and seen actors, with the same seeds, actions and unit points."""
     ego = {"sensor": {"occlusion": False}}
     spec = RunSpec.model_validate({"family": "mixed", "method": "random", "seed": 0, "odd": odd, "ego": ego})
     played = b""

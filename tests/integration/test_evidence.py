@@ -1,4 +1,4 @@
-"""A campaign that ends with an i.i.d. phase, and its report: real server, real workers, and the command line."""
+"""Campaign with an i.i.d. phase, and its report, by service and CLI."""
 
 import json
 import resource

@@ -1,4 +1,4 @@
-"""What a run keeps of its episodes does not grow with them, and it goes on from that."""
+"""A run's kept state does not grow with its episodes, and resumes."""
 
 import hashlib
 import io

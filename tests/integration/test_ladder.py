@@ -1,4 +1,4 @@
-"""Better egos fail less: the same attacks on each, from the slowest driver to the careful one."""
+"""Better egos fail less under the same attacks, from slowest to careful."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -25,7 +25,7 @@ PHASES = 10  # of the ego's reaction in which attacks begin: an ego about to dec
 
 
 def scenes(family: FamilyName, space_middle: Scene) -> Iterator[Scene]:
-    """A neighbour at several distances ahead; a walker that stands at the kerb, at several distances of the ego."""
+    """Yields scenes with a neighbour ahead or a walker at the kerb."""
     if family == "low":
         for offset_m in np.linspace(4.0, 16.0, 13):
             for speed_mps in (10.0, 13.0, 16.0):
@@ -53,7 +53,7 @@ def attack(family: FamilyName, env: RiskSacEnv, step: int) -> np.ndarray:
 
 
 def touched(family: FamilyName, ego: EgoConfig) -> tuple[int, int]:
-    """Episodes in which the ego ran into an actor, and how many there were."""
+    """Counts the episodes in which the ego hit an actor, and all."""
     spec = RunSpec(family=family, method="random", seed=0, ego=ego, odd=EMERGENCY)
     problem = Problem.from_spec(spec)
     hits = count = 0

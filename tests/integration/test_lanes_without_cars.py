@@ -1,4 +1,4 @@
-"""Actors that start on a lane that cars may not drive: at a kerb, and on a bus lane."""
+"""Actors that start at a kerb or on a bus lane."""
 
 from collections.abc import Iterator
 from contextlib import closing

@@ -1,4 +1,4 @@
-"""Views of a campaign with many episodes: a helper process makes them, and they are what the server would make."""
+"""Views of large campaigns: made by a helper, equal to the server's."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -50,7 +50,7 @@ def here(service: Service, campaign: str) -> Iterator[Callable[..., Content]]:
 
 
 def asked(service: Service, method: str, path: str, **options: Any) -> tuple[httpx.Response, set[tuple[int, int]]]:
-    """An answer, and the limits on memory of the helper processes that were seen to make it."""
+    """Returns an answer and the memory limits of its helper processes."""
     server, limits = psutil.Process(service.process.pid), set()
     with ThreadPoolExecutor(1) as pool:
         answer = pool.submit(service.client.request, method, path, **options)

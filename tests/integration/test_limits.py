@@ -1,4 +1,4 @@
-"""Limits of a server of this machine alone: rates, sizes of bodies, lost keys, and addresses that need keys."""
+"""Limits of a local server: rates, body sizes, lost keys and addresses."""
 
 import itertools
 import os
@@ -34,7 +34,7 @@ def forget(service):
 
 
 def at_once(ask, count=60):
-    """Answers to so many requests, made within two of the seconds that the server counts by."""
+    """Returns answers to `count` requests, made within two of the server's seconds."""
     while True:  # a busy machine takes several tries
         time.sleep(1.1)  # the server has forgotten what came before
         began = int(time.monotonic())

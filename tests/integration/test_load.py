@@ -1,4 +1,4 @@
-"""Nothing leaks: a small and short `make load`, and episode after episode in one process."""
+"""Nothing leaks: a short `make load`, and many episodes in one process."""
 
 import json
 import subprocess

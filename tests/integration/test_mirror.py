@@ -44,7 +44,7 @@ LOW, MIXED, DENSE = middle("low"), middle("mixed"), middle("dense")
 
 @dataclass(frozen=True)
 class Place:
-    """A stretch of the ego's path, and where on it an actor gets in its way."""
+    """Stretch of the ego's path with a place where an actor interferes."""
 
     layout: Layout
     route: tuple[str, ...]
@@ -93,7 +93,7 @@ def drive(sim: SumoSimulation, steps: int, before_step: Callable[[float], None])
 
 
 def pose(sim: SumoSimulation, station_m: float, aside_m: float) -> tuple[float, float, float]:
-    """Place and heading of a point beside the ego's path, positive to its left."""
+    """Pose of a point beside the ego's path, positive to the left."""
     path = sim.along("ego").path
     i = min(max(int(np.searchsorted(path[STATION], station_m)) - 1, 0), path.shape[1] - 2)
     x_m, y_m, start_m, heading = path[:4, i]
@@ -105,7 +105,7 @@ def pose(sim: SumoSimulation, station_m: float, aside_m: float) -> tuple[float, 
 def meet_pedestrian(
     sim: SumoSimulation, place: Place, side: int, motion: str, speed_mps: float, friction: float
 ) -> Drive:
-    """A pedestrian stands aside until it would meet an ego that keeps its speed; one that stands is in the lane."""
+    """A pedestrian meets an ego that keeps its speed, or stands."""
     pace = PACES_MPS[motion]
     aside_m = place.aside_m if pace else 0.0
     before_m = max(4.0 * speed_mps + 5.0, 35.0)
@@ -142,7 +142,7 @@ def meet_pedestrian(
 
 
 def has_the_distance(speed_mps: float, warning_s: float) -> bool:
-    """Whether what the ego covers in that time suffices for its reaction and for stopping at 4.5 m/s²."""
+    """Whether the warning time suffices for reaction and stopping at 4.5 m/s²."""
     return speed_mps * warning_s >= speed_mps * (REACTION_S + BUILD_UP_S) + speed_mps**2 / 9.0 + 2.5
 
 
@@ -162,8 +162,10 @@ def test_pedestrians_from_either_side_are_alike(sim: SumoSimulation, where: str,
 
 
 def meet_vehicle(sim: SumoSimulation, side: int, kind: str, speed_mps: float, friction: float) -> Drive:
-    """Another vehicle, moved as told whatever the road says; the ego keeps its lane, or SUMO's rule to overtake on the
-    left would make the sides differ."""
+    """Meets another vehicle, moved as told; the ego keeps its lane.
+
+    Otherwise SUMO's rule to overtake on the left would make the sides differ.
+    """
     here = VehicleStart(id="ego", role=Role.EGO, route=("road",), lane=1, position_m=200.0, speed_mps=speed_mps)
     other = VehicleStart(id="other", role=Role.ADVERSARY, route=("road",), lane=0, position_m=260.0, speed_mps=0.0)
     frame: Frame = sim.reset(replace(LOW, ego=here, vehicles=(other,), friction=friction), 1)

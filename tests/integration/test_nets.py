@@ -1,4 +1,4 @@
-"""SUMO's driver on each shipped net, among traffic that keeps two seconds: it arrives, and touches nothing."""
+"""SUMO's driver on each shipped net in traffic: arrives, touches nothing."""
 
 from collections.abc import Iterator
 from contextlib import closing

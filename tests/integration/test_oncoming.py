@@ -1,4 +1,4 @@
-"""Adversaries that leave their edge for oncoming lanes, on a road with one lane per direction and on others."""
+"""Adversaries that enter oncoming lanes, on roads of one or more lanes."""
 
 import math
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ LEAD_STEPS = 15
 
 
 class Steady:
-    """Keeps the speed and the heading that the ego is handed over with."""
+    """Keeps the speed and heading that the ego has at its handover."""
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
         self.motion = Motion(*(float(frame.state[row, 0]) for row in (X, Y, HEADING)), SPEED_MPS)
@@ -73,7 +73,7 @@ def meeting(apart_m: float, ego_edge: str = "eastbound", edge: str = "westbound"
 def play(
     sim: SumoSimulation, layout: Layout, steers: list[float], drive: float = 0.0
 ) -> tuple[list[Frame], Contact | None, list[bool]]:
-    """Frames, the ego's first contact, and whether the adversary was outside its own lanes in each frame."""
+    """Returns frames, first contact, and whether the adversary left its lanes."""
     frame = sim.reset(layout, 1)
     for _ in range(LEAD_STEPS):
         frame = sim.step()
@@ -94,7 +94,7 @@ def play(
 
 
 def in_own_frame(frames: list[Frame]) -> Floats:
-    """Way along and across since the first frame, and turn of the adversary, `T x 3`."""
+    """Returns the adversary's way along and across, and turn, `T x 3`."""
     states = np.array([frame.state[:, 1] for frame in frames])
     dx, dy = states[:, X] - states[0, X], states[:, Y] - states[0, Y]
     cos, sin = round(math.cos(states[0, HEADING])), round(math.sin(states[0, HEADING]))

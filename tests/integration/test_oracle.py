@@ -1,4 +1,4 @@
-"""Our box oracle beside SUMO's own list of collisions, in the family of vehicles only.
+"""Our box oracle against SUMO's list of collisions, for vehicles only.
 
 SUMO measures along and across the lane and takes no account of a body's angle. Aligned bodies must meet in the same
 step.
@@ -36,7 +36,7 @@ def blind() -> Iterator[SumoSimulation]:
 
 
 def episode(sim: SumoSimulation, seed: int) -> Iterator[Frame]:
-    """Frames of a random episode without steering, in which the leader stands in the ego's way."""
+    """Frames of a random episode without steering, behind a standing leader."""
     generator = np.random.default_rng(seed)
     layout = LOW.layout(LOW.space.from_unit(generator.random(LOW.space.dimension)).values)
     frame = sim.reset(layout, seed)

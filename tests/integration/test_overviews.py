@@ -1,4 +1,4 @@
-"""What shows a whole campaign at once, and what people note of it, on a real server."""
+"""Overviews of a whole campaign and people's notes, on a real server."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Verdicts on the scenes of a sweep over REST: real server, real worker."""
+"""Verdicts on a sweep's scenes over REST, with real server and worker."""
 
 import csv
 import io

@@ -47,7 +47,7 @@ def trained(
     interrupted: bool = False,
     stages: Sequence[policy.TrainingStage] = policy.STAGES,
 ) -> PolicyTraining:
-    """A trained policy; an interruption comes after the first point of its curve."""
+    """Trains a policy; an interruption comes after the curve's first point."""
     folder.mkdir()
     for points in (1, None) if interrupted else (None,):
         training = PolicyTraining("low", 5, episodes, stages=stages)
@@ -69,7 +69,7 @@ SHORT = tuple(
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A training with few episodes in which the policy already acts and learns."""
+    """Shortens the training to few episodes that still act and learn."""
     monkeypatch.setattr(policy, "EPISODES", 1)
     monkeypatch.setattr(policy, "TURNS", 2)
     monkeypatch.setattr(policy, "EVALUATED_EVERY", 3)

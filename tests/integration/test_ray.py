@@ -1,4 +1,4 @@
-"""The command line and the service on a Ray cluster of two nodes, and what is told of a wrong one at the start."""
+"""Command line and service on a Ray cluster of two nodes."""
 
 import contextlib
 import json
@@ -59,7 +59,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def actors(cluster: Cluster, kind: str = "Attendant") -> list[psutil.Process]:
-    """Processes of Ray that attend a run, or one of its rollout processes."""
+    """Ray's processes that attend a run, or one of its rollouts."""
     processes = [process for node in cluster.nodes for process in cluster.processes(node)]
     return [process for process, name in processes if name.startswith(f"ray::{kind}")]
 
@@ -104,7 +104,7 @@ def test_rounds_are_played_on_several_nodes_and_a_killed_actor_is_replaced(clust
     log, killed = tmp_path / "ray" / "runs" / "low-archive-0" / LOG, []
 
     def lost() -> bool:
-        """Kills the actor that plays for the run, until it dies while it plays."""
+        """Kills the run's actors until one dies while it plays."""
         for actor in actors(cluster, "RolloutAttendant"):
             with contextlib.suppress(psutil.NoSuchProcess):
                 if actor not in killed and actor.children():

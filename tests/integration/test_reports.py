@@ -1,4 +1,4 @@
-"""The report of a campaign over REST: real server, real workers, and `risk_sac.report` on the same folders."""
+"""Report of a campaign over REST, against `risk_sac.report` on the folders."""
 
 import json
 import re

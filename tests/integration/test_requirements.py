@@ -1,4 +1,4 @@
-"""What the requirements and C_soft say of traffic, measured with the real simulator.
+"""Requirements and C_soft on traffic, measured with the real simulator.
 
 A few episodes a family on fixed seeds; `Statistics` is what a report on more of them would compute as well. Signals and
 scales were tuned on the seeds 2000 to 3700 and 9000 to 9039; what these tests play was not looked at before.
@@ -162,12 +162,12 @@ def dangerous(env: RiskSacEnv, seed: int) -> Scene:
 
 
 def is_degenerate(collision: Collision) -> bool:
-    """Whether it is no failure of the ego's: struck from behind or on its flank, or while it stands."""
+    """Whether the ego is not at fault: struck from behind, aside, standing."""
     return not all(passed for rule, passed in collision.verdicts.items() if rule not in ARTEFACT_RULES)
 
 
 def before_contacts(env: RiskSacEnv, seeds: range) -> list[Floats]:
-    """The soft minimum in the last 3 s before each contact, or since the release: what was before is no danger."""
+    """Soft minimum in the last 3 s before contacts, since the release."""
     found = []
     for seed in seeds:
         scripted = ScriptedAgent(env.action_size, seed)
@@ -179,7 +179,7 @@ def before_contacts(env: RiskSacEnv, seeds: range) -> list[Floats]:
 
 
 def moved_for_s(soft: Floats) -> float:
-    """For how long before the contact it has been below where it started by `MOVED`, without a break."""
+    """Time before the contact since it stays `MOVED` below its start, s."""
     above = np.flatnonzero(soft >= soft[0] - MOVED)
     return float(len(soft) - 1 - above[-1]) * STEP_S
 

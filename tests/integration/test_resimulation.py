@@ -1,4 +1,4 @@
-"""A reference driver's verdict holds in SUMO, too, with that driver at the wheel.
+"""A reference driver's verdict holds in SUMO with that driver in control.
 
 The verdict moves boxes along recorded paths. Here SUMO moves the ego along its lanes and over its junctions at the
 reference driver's speeds, while the striker goes where it was recorded.
@@ -65,7 +65,7 @@ def contacts(env: RiskSacEnv, episodes: int) -> Iterator[Struck]:
 
 
 def speeds(struck: Struck, driver: str) -> list[float]:
-    """Of the reference driver, step by step: as recorded until it perceives, then its own."""
+    """Speeds of the reference driver: recorded until it perceives, then its own."""
     evidence = struck.evidence
     perceives_s = R157_PERCEIVES_S if driver == "r157" else 0.0
     grip = evidence.ground.friction * GRAVITY_MPS2
@@ -88,7 +88,7 @@ def pose(before: Frame, frame: Frame, share: float) -> Pose:
 
 
 def strikers_pose(struck: Struck, at: float) -> Pose:
-    """The striker's at a fraction of a frame; after the contact it keeps its velocity."""
+    """Returns the striker's interpolated pose; after contact, at constant velocity."""
     e, column, last = struck.evidence, struck.striker, len(struck.evidence.time_s) - 1
     k = min(int(at), last)
     share, ahead_s = at - k, (at - last) * STEP_S
@@ -112,9 +112,10 @@ def struck_side(
 
 
 def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
-    """Whether the driver, with SUMO's ego under it, does not touch, stands when struck, or is struck from behind.
+    """Returns whether the driver, with SUMO's ego, avoids causing the contact.
 
-    And has not passed the place where the recorded ego was by then.
+    It does not touch, stands when struck, or is struck from behind, and has not passed the place where the recorded
+    ego was by then.
     """
     evidence = struck.evidence
     driven, last = speeds(struck, driver), len(evidence.time_s) - 1

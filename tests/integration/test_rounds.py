@@ -1,4 +1,4 @@
-"""Episodes that are asked for in rounds and played by processes of their own."""
+"""Episodes proposed in rounds and played by processes of their own."""
 
 import os
 import signal
@@ -141,7 +141,7 @@ def test_a_stopped_run_goes_on_as_if_it_had_not(tmp_path: Path, processes) -> No
 
 
 def play_elsewhere(connection: Connection, folder: Path, told: list[str]) -> None:
-    """Plays what the connection proposes, but loses the second proposal, and the process with it."""
+    """Plays what the connection proposes, but loses the second proposal and process."""
     terms = connection.recv()
     with closing(Rollouts(terms, folder, 1, first=1)) as rollouts, suppress(EOFError):
         connection.send(True)

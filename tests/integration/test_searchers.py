@@ -1,4 +1,4 @@
-"""Turns of a method's own searcher and its guide, and the end of a search."""
+"""Turns between a method's own searcher and its guide; search ends."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Egos that use other lanes than their first one, or leave the road, in real episodes."""
+"""Egos that change lanes or leave the road, in real episodes."""
 
 from contextlib import closing
 
@@ -19,7 +19,7 @@ LEAD = 0  # its acceleration in the joint action
 
 
 def drive(family: str, driver: str, seed: int, *, lead: float | None = None) -> list[Frame]:
-    """The frames of an episode without an attack, or in which the lead vehicle brakes or speeds up."""
+    """Frames of an episode without attack, or with a commanded lead vehicle."""
     spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver))
     with closing(RiskSacEnv(RiskSacEnv.of(spec).problem, spec.learner.reward, controlled=lead is not None)) as env:
         env.reset(seed=seed)

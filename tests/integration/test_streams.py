@@ -102,7 +102,7 @@ def test_a_stream_of_what_comes_tells_all_that_comes(shared):
 
 @pytest.mark.parametrize("kills", [2, pytest.param(5, marks=pytest.mark.torture)])
 def test_streams_through_killed_servers_tell_everything_once(serve, kills):
-    """Each client comes back with the last id it has; the server is killed under them again and again."""
+    """Clients resume from their last id while the server is repeatedly killed."""
     service = serve("striking_worker")
     episodes = 40 * kills
     campaign_id = service.post(seeds=[0, 1], budget={"episodes": episodes})

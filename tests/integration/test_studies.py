@@ -1,4 +1,4 @@
-"""What is made of a failure by playing it again, over REST: a real campaign of a real server."""
+"""Studies of replayed failures over REST, with a real server and campaign."""
 
 import signal
 import subprocess
@@ -21,7 +21,7 @@ SPEC = {"families": ["mixed"], "methods": ["archive"], "seeds": [5], "budget": {
 
 @pytest.fixture(scope="module")
 def campaign(serve_shared):
-    """A server, the id of a campaign that has ended, and that of one of its failures."""
+    """Server, id of an ended campaign, and one of its failures."""
     service = serve_shared("risk_sac.execution.worker", grace_s=30, replays=2)
     campaign_id = service.post(**SPEC)
     ended = service.wait(campaign_id)

@@ -1,4 +1,4 @@
-"""Scenarios played as they are written: the whole grid, a sample of it, or a search of its parameters."""
+"""Scenarios played as written: the whole grid, a sample, or a search."""
 
 from pathlib import Path
 from typing import Any
@@ -83,7 +83,7 @@ def test_a_sweep_plays_each_point_once_and_counts_those_refused(sweep):
 
 
 def test_both_sides_of_the_road_have_the_same_verdicts(sweep):
-    """But for the smallest gap: SUMO's driver falls behind a slower vehicle on its left, and is not cut off."""
+    """Except the smallest gap, where SUMO's driver falls behind on one side."""
     left, right = ([r.avoided_by for r in half if r.scene["gap_m"] > 6] for half in (sweep[:6], sweep[6:]))
     assert left == right
     assert {told["r157"] for told in left if told is not None} == {True, False}
@@ -129,7 +129,7 @@ def test_a_search_of_the_parameters_keeps_the_constraints_and_attacks_with_nothi
 
 @pytest.mark.parametrize("driver", [None, "idm-aeb"])
 def test_an_ego_keeps_the_speed_and_the_lane_that_it_is_told(family, driver):
-    """The limit of the motorway is higher, and the vehicle that it follows is slower than the one in the next lane."""
+    """The motorway's limit is higher, and the next lane is faster."""
     env = RiskSacEnv.of(spec(family, ego=EgoConfig(driver=driver)))
     env.reset(seed=0, options={"scene": Scene(family, {"side": 0.25, "gap_m": 26.0, "slower_mps": 5.0})})
     over = False

@@ -12,7 +12,7 @@ def service(striking):
 
 
 def posted(service, label, **spec):
-    """Id of a campaign of this version of the ego, which has succeeded."""
+    """Runs a campaign of this version of the ego; returns its id."""
     campaign_id = service.post(**{"ego": {"profile": EGO, "label": label}, "budget": BUDGET} | spec)
     assert service.wait(campaign_id)["state"] == "succeeded"
     return campaign_id
@@ -20,7 +20,7 @@ def posted(service, label, **spec):
 
 @pytest.fixture(scope="module")
 def campaigns(service):
-    """Ids by what they are: two versions on the same terms, one on a larger budget, one of another scenario."""
+    """Ids of campaigns: two versions alike, a larger budget, another scenario."""
     iid = {"episodes": 10}
     return {
         "1.3": posted(service, "1.3", iid=iid),

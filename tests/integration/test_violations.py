@@ -1,4 +1,4 @@
-"""Violations without contact, of real episodes; every method finds an ego that ignores red lights."""
+"""Real violations without contact; all methods find egos that ignore red."""
 
 from pathlib import Path
 
@@ -65,7 +65,7 @@ RED = "no_red_light_entry"
 
 
 class UntilFound:
-    """Stops a run after the first episode in which the ego entered on red."""
+    """Observer that stops a run once the ego has entered on red."""
 
     found: EpisodeRecord | None = None
 

@@ -49,7 +49,7 @@ class Phase:
 
 
 def measure(seconds: float, phase_s: float, warm_up_s: float, pollers: int, streams: int) -> list[Phase]:
-    """Run the phases on a service of their own, `seconds` of them loaded."""
+    """Runs the phases on a service of their own, `seconds` under load."""
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder)) as serve:
         service = serve("risk_sac.execution.worker", lease_s=60)
         ids = [service.post(label=f"campaign {seed}", seeds=[seed], **SPEC) for seed in range(CAMPAIGNS)]
@@ -137,7 +137,7 @@ def _rate(phases: Sequence[Phase], name: str) -> float:
 
 
 def _loss(quiet: Sequence[Phase], loaded: Sequence[Phase]) -> float:
-    """Share of the quiet throughput that is lost, with the generator's processor time given back."""
+    """Returns the throughput lost under load, the generator's own time deducted."""
     had, has = _rate(quiet, "workers_s"), _rate(loaded, "workers_s")
     given_back = max(has, min(had, has + _rate(loaded, "generator_s"))) / has
     return 1 - _rate(loaded, "steps") * given_back / _rate(quiet, "steps")

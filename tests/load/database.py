@@ -1,4 +1,4 @@
-"""What a service answers that has run for years: 10,000 campaigns with 1,000,000 episodes in its database.
+"""Answers of a large service: 10,000 campaigns with 1,000,000 stored episodes.
 
 The rows are copies of those of one real campaign, made by SQL whatever columns the tables have. One client asks at a
 time, so that a latency is what one answer costs.
@@ -70,7 +70,7 @@ def judge(measured: Measured) -> Iterator[Promise]:
 
 
 def populate(file: Path, campaigns: int, runs: int) -> tuple[list[str], str]:
-    """Copy the only campaign of a database, once with many runs; returns the ids, and that of the large one."""
+    """Copies a database's campaign, once with many runs; returns the ids."""
     with sqlite3.connect(file) as database:
         database.row_factory = sqlite3.Row
         (campaign,) = database.execute("SELECT * FROM campaigns").fetchall()
@@ -109,7 +109,7 @@ def populate(file: Path, campaigns: int, runs: int) -> tuple[list[str], str]:
 def _copy_run(
     database: sqlite3.Connection, run: sqlite3.Row, campaign: int, spec: RunSpec, state: str, offset: int
 ) -> None:
-    """Copy a run with its episodes and events; `offset` is added to their places among the campaign's events."""
+    """Copies a run with episodes and events, whose places grow by `offset`."""
     names = {"family": spec.family, "method": spec.method, "seed": spec.seed, "spec_digest": spec.digest}
     number = _insert(
         database,

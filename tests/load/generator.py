@@ -1,4 +1,4 @@
-"""`python -m tests.load.generator --port PORT CAMPAIGN...`: pollers and event streams, in a process of their own.
+"""`python -m tests.load.generator --port PORT CAMPAIGN...`: pollers and event streams.
 
 It speaks just enough HTTP/1.1 itself: a client library costs several times what the service spends on an answer.
 It prints what it saw as JSON.
@@ -50,7 +50,7 @@ async def head(reader: asyncio.StreamReader) -> tuple[int, dict[str, str]]:
 
 
 async def poll(port: int, kind: str, campaign: str, due: float, end: float, conditional: bool, seen: Seen) -> None:
-    """Ask every second. A latency counts from the moment at which the request was due."""
+    """Asks every second; latencies count from when a request was due."""
     loop = asyncio.get_running_loop()
     path = (
         "/v1/campaigns" if kind == "list" else f"/v1/campaigns/{campaign}" + ("/results" if kind == "results" else "")
@@ -81,7 +81,7 @@ async def poll(port: int, kind: str, campaign: str, due: float, end: float, cond
 
 
 async def follow(port: int, campaign: str, stays_s: float, chance: Random, seen: Seen) -> None:
-    """Follow a campaign's events until cancelled; break off now and then, and go on after the last id."""
+    """Follows a campaign's events until cancelled, breaking off and resuming at times."""
     last: dict[str, str] = {}
     expected: dict[bytes, int] = {}  # index by run and phase
     await asyncio.sleep(chance.uniform(0, 2.0))

@@ -1,4 +1,4 @@
-"""Whether a run grows with its episodes: its cost per episode, its memory and its files.
+"""Growth of a run with its episodes: time, memory and files.
 
     python -m tests.load.growth archive 100000 FOLDER
 

@@ -67,7 +67,7 @@ class Measured:
 
 
 def measure(episodes: int) -> Measured:
-    """Make a campaign of so many episodes, start its service again, and ask."""
+    """Makes a campaign of so many episodes, restarts its service, and asks."""
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder), lease_s=60) as serve:
         service = serve("risk_sac.execution.worker")
         service.wait(service.post(methods=["archive"], budget={"episodes": SOURCE}, ego={"profile": "defensive"}))
@@ -78,7 +78,7 @@ def measure(episodes: int) -> Measured:
 
 
 def enlarge(data_dir: Path, times: int) -> None:
-    """Repeat the episodes of the only run in a data folder, whose server has stopped, so many times."""
+    """Repeats the episodes of the only run in a stopped server's folder."""
     (results,) = data_dir.glob(f"campaigns/*/*/{RESULTS}")
     folder, found = results.parent, read_results(results)
     played = records_from_lines((folder / EPISODES).read_bytes())

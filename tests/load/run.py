@@ -1,4 +1,4 @@
-"""`python -m tests.load.run`: measure on this machine what the service promises under load.
+"""`python -m tests.load.run`: measures here what the service promises under load.
 
 Takes about half an hour, and wants a machine with nothing else to do. Shorter trials are noisier.
 """

@@ -1,4 +1,4 @@
-"""Faults in earnest: the full counts with RISK_SAC_TORTURE=full (`make torture`), a few of each without.
+"""Counts of faults: full with RISK_SAC_TORTURE=full (`make torture`), else a few.
 
 The suite itself uploads a part of the hostile files, and leaves all that is marked `torture` alone.
 """

@@ -1,4 +1,4 @@
-"""A disk that refuses on command, for every process that is started with its environment."""
+"""Disk that refuses on command, for processes started with its environment."""
 
 import errno
 import mmap
@@ -18,7 +18,7 @@ def compiler() -> str | None:
 
 
 class Disk:
-    """Refuses the calls that would change a file below one folder, counted over all processes.
+    """Refuses calls that would change a folder's files, over all processes.
 
     Attributes:
       environment: what to start a process with that is to meet this disk.

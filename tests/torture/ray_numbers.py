@@ -24,7 +24,7 @@ WORKER = "risk_sac.execution.worker"
 
 
 def kills(options: argparse.Namespace) -> str:
-    """A campaign that was never disturbed says what the others must come to."""
+    """Compares disturbed campaigns with one that was never disturbed."""
     chance = random.Random(options.seed)
     spec = {
         "families": ["low"], "methods": ["risk-sac", "random"], "seeds": [0], "budget": {"episodes": options.episodes},
@@ -96,7 +96,7 @@ def _worker(cluster: Cluster, service: Service, chance: random.Random) -> bool:
 
 
 def _raylet(cluster: Cluster, service: Service, chance: random.Random) -> bool:
-    """Of the node that is not the head's; a supervisor would start it again, as is done here."""
+    """Kills the second node's raylet and starts it again, as a supervisor."""
     killed = cluster.kill(1, "raylet")
     cluster.end(1)
     cluster.add(1)
@@ -113,7 +113,7 @@ def _head(cluster: Cluster, service: Service, chance: random.Random) -> bool:
 
 
 def _hang(cluster: Cluster, service: Service, chance: random.Random) -> bool:
-    """All processes of a node stand still for longer than its lease, and then go on."""
+    """Stops all processes of a node beyond its lease, then continues them."""
     if not any("raylet" in name for name in cluster.names(1)):  # the head has given it up since the last time
         cluster.end(1)
         cluster.add(1)

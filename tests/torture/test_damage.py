@@ -1,4 +1,4 @@
-"""Files that lose their end or flip a bit: noticed, and gone on from the last good state, or refused with the reason.
+"""Damaged files are noticed: recovered from the last good state, or refused.
 
 What is read of a file afterwards is either what was read before, or an error that says what is damaged. A database
 that SQLite's integrity check refuses is not opened; a bit that flips within the text of a row may be read as it is.
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.torture  # the suite damages checkpoints, rows and resu
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data folder with a campaign that ended and one that a kill interrupted."""
+    """Data folder with an ended campaign and one that a kill interrupted."""
     folder = tmp_path_factory.mktemp("damage")
     with servers(folder) as serve:
         service = serve("risk_sac.execution.worker", lease_s=60)
@@ -62,7 +62,7 @@ def damage(path: Path, random: Random) -> str:
 
 
 def readings(data: Path) -> dict[str, object]:
-    """Everything the service would tell of a data folder; an error in the place of what is damaged."""
+    """Returns all that the service reads of a folder, or the error."""
     settings = ServiceSettings(data_dir=data)
     try:
         store = Store(settings.url)
@@ -96,7 +96,7 @@ def readings(data: Path) -> dict[str, object]:
 
 
 def told_files(data: Path) -> list[Path]:
-    """Series that an episode names (a kill may have left one that none does yet), and results that a table shows."""
+    """Returns series that an episode names, and results that a table shows."""
     settings = ServiceSettings(data_dir=data)
     store = Store(settings.url)
     found = []
@@ -118,7 +118,7 @@ def any_error(found: dict[str, object]) -> bool:
 
 
 def noticed(before: dict[str, object], after: dict[str, object]) -> bool:
-    """Whether anything is told to be damaged; all else must be as before."""
+    """Returns whether any damage is reported; all else must be as before."""
     errors = {name for name, reading in after.items() if isinstance(reading, Exception)}
     for name, reading in after.items():
         assert name in errors or (name in before and repr(reading) == repr(before[name])), name
@@ -187,7 +187,7 @@ def test_a_run_with_a_damaged_file_goes_on_from_the_last_good_one(data, tmp_path
 
 
 def go_on(spec: RunSpec, folder: Path, stop_after: int | None = None) -> str:
-    """Digest of a run that is started or goes on in a process of its own, or why it cannot."""
+    """Starts or continues a run in a process; returns digest or reason."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["risk_sac.execution.evaluate"])
     receiver, sender = context.Pipe(duplex=False)

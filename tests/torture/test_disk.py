@@ -1,4 +1,4 @@
-"""A disk that is full, or fails once, at any of a service's first writes: nothing is lost, all goes on when it can."""
+"""A disk that refuses a service's first writes loses nothing."""
 
 import sqlite3
 import time
@@ -55,7 +55,7 @@ def test_no_write_that_the_disk_refuses_loses_or_breaks_anything(serve, wanted, 
 
 
 def follow(service, disk):
-    """Post a campaign as a careful client does, heal the disk once that shows; whether a pause was seen."""
+    """Posts carefully, heals the disk once noticed; returns whether a pause showed."""
     paused = queued = False
     headers = {"Idempotency-Key": "the-one"}
     campaign_id = None

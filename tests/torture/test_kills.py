@@ -1,4 +1,4 @@
-"""Servers and workers that are killed at random moments lose nothing and change nothing.
+"""Randomly killed servers and workers lose nothing and change nothing.
 
 The runs are real, of each kind of campaign in turn; one that was never disturbed says what they must come to.
 """

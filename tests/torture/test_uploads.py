@@ -1,4 +1,4 @@
-"""Uploads that want to do harm: each is refused in time, says why, and leaves nothing anywhere."""
+"""Harmful uploads are refused in time with a reason, leaving nothing behind."""
 
 import re
 import time
@@ -23,7 +23,7 @@ def service(serve: Callable[..., Service], tmp_path: Path) -> Service:
 
 
 def listed(folder: Path) -> dict[str, int]:
-    """Everything below a folder with its size, but for what a server writes at any time."""
+    """Returns a folder's content with sizes, without the server's changing files."""
     paths = [path for path in folder.rglob("*") if path.name not in DATABASE and path.suffix != ".log"]
     return {str(path.relative_to(folder)): path.stat().st_size if path.is_file() else -1 for path in paths}
 

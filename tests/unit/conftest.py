@@ -44,7 +44,7 @@ def metrics():
 
 @pytest.fixture
 def episode(metrics):
-    """Builds the report of an episode; a contact has a minimum TTC of NaN, all have one of infinity."""
+    """Builds an episode's report; TTC minima: contact NaN, episode infinity."""
     contact = collision(
         early_min_ttc_s=math.nan, early_min_robustness=-math.inf, verdicts={"feasible": True}, judgement=judgement()
     )

@@ -1,4 +1,4 @@
-"""The page in a real browser, on a real service with a real campaign."""
+"""The page in a real browser, on a service with a campaign."""
 
 import fcntl
 import os
@@ -46,7 +46,7 @@ CAMPAIGN = {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator["Browser"]:
-    """One browser for a module's tests, and no longer: its event loop would be in the way of others' tests."""
+    """One browser per module: its event loop would disturb other tests."""
     with sync_playwright() as playwright:
         # Containers have no sandbox of their own to give; what is opened here is ours alone.
         browser = playwright.chromium.launch(executable_path=EXECUTABLE, args=["--no-sandbox"])
@@ -56,7 +56,7 @@ def browser() -> Iterator["Browser"]:
 
 @pytest.fixture(scope="session")
 def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The data folder and the id of a finished campaign of two families, which one test process plays for all.
+    """Data folder and id of a finished campaign, played once for all.
 
     It has valid failures and refused contacts; its label is hostile.
     """
@@ -96,7 +96,7 @@ def campaign(service: Service, played: tuple[Path, str]) -> str:
 
 @pytest.fixture(scope="session")
 def network(service: Service) -> str:
-    """A map that the service has, under a label that is long and hostile."""
+    """Uploads a map under a long, hostile label; returns its id."""
     headers = {"content-type": "application/xml"}
     answer = service.client.post("/v1/networks", params={"label": HOSTILE}, content=NET.read_bytes(), headers=headers)
     return str(answer.raise_for_status().json()["id"])
@@ -104,7 +104,7 @@ def network(service: Service) -> str:
 
 @pytest.fixture
 def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Page"]]:
-    """Opens pages, in contexts of their own, and fails where one of them said or asked for what it should not.
+    """Opens pages in their own contexts; fails on errors and foreign requests.
 
     That is an error on the console, an uncaught one, a violation of the content-security policy (which the
     console tells), and any request that leaves the loopback. Tests that break something on purpose name what the
@@ -157,7 +157,7 @@ def page_at(new_page: Callable[..., "Page"], service: Service) -> Callable[..., 
 
 @pytest.fixture
 def check_axe() -> Callable[..., None]:
-    """Checks a page by the accessibility rules of axe; by all of them unless some are named."""
+    """Checks a page by axe's accessibility rules, all unless some are named."""
 
     def check(page: "Page", rules: list[str] | None = None) -> None:
         page.evaluate(Path(AXE).read_text(encoding="utf-8"))  # by the debugger, which no policy forbids
@@ -172,7 +172,7 @@ def check_axe() -> Callable[..., None]:
 
 @pytest.fixture
 def check_fits(check_axe: Callable[..., None]) -> Callable[["Page"], None]:
-    """Checks a page at its width in both themes, and that it needs no scrolling to the side, at a desk either."""
+    """Checks a page in both themes, and that no width needs scrolling."""
 
     def check(page: "Page") -> None:
         show_in(page, "light")
@@ -193,5 +193,5 @@ def show_in(page: "Page", scheme: str) -> None:
 
 
 def count(value: int | None) -> str:
-    """As the page shows it; the headline is not known where nothing was replayed."""
+    """Formats a number as the page does; a dash for no headline."""
     return "–" if value is None else str(value)

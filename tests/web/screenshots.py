@@ -1,4 +1,4 @@
-"""`make screenshots`: every screen as a picture in results/screenshots, and the one of README.md.
+"""`make screenshots`: pictures of every screen, and the one of README.md.
 
 `python -m tests.web.screenshots --data DIR SCREEN ...` draws some, of campaigns that are played once and kept in DIR.
 """
@@ -42,7 +42,7 @@ PLAIN: dict[str, tuple[str, Callable[[Page], None]]] = {
 
 
 def main(wanted: list[str], data: Path) -> None:
-    """Draws the named screens, or all, in both themes and at both widths."""
+    """Draws the named screens, or all, in both themes and widths."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     data.mkdir(parents=True, exist_ok=True)
     screens = {name: each for name, each in (SCREENS | PLAIN).items() if name in wanted or not wanted}
@@ -70,7 +70,7 @@ def main(wanted: list[str], data: Path) -> None:
 
 
 def played(service: Service, known: Path) -> dict[str, str]:
-    """Ids of two campaigns, a failure and a map, which are made unless the file names them."""
+    """Returns ids of two campaigns, a failure and a map, made once."""
     if not known.exists():
         campaign, second = service.post(**NIGHTLY), service.post(**SECOND)
         for each in (campaign, second):
@@ -85,7 +85,7 @@ def played(service: Service, known: Path) -> dict[str, str]:
 
 
 def chosen(service: Service, campaign: str) -> str:
-    """A pedestrian out of hiding, which shows what the ego sees; of those the best grade, and the fastest."""
+    """Chooses a failure: a hidden pedestrian first, then grade, then speed."""
 
     def order(failure: dict[str, Any]) -> tuple[bool, int, float]:
         collision = failure["collision"]
@@ -110,7 +110,7 @@ def opened(
 
 
 def show_all(page: Page) -> None:
-    """Scrolls to the end and back, since pictures below load only when they come into view."""
+    """Scrolls to the end and back: pictures load when in view."""
     page.evaluate("""async () => {
         for (let y = 0; y < document.documentElement.scrollHeight; y += 500) {
             scrollTo(0, y);

@@ -1,4 +1,4 @@
-"""The screen of one campaign: what it has found, how it goes on, and what can be done with it."""
+"""Screen of one campaign: its finds, its progress, and its actions."""
 
 import json
 import re

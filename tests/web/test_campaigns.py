@@ -1,4 +1,4 @@
-"""The list of campaigns: what it says, how it is filtered and sorted, and what can be done from it."""
+"""List of campaigns: content, filters, sorting, and actions."""
 
 import json
 import re
@@ -16,7 +16,7 @@ HOSTILE = "<img src=x onerror=alert(1)> ‮& \"'"
 
 @pytest.fixture(scope="module")
 def small(service: Service, campaign: str) -> Iterator[dict[str, str]]:
-    """Two more campaigns that have ended, by their labels; one of these is hostile."""
+    """Two more ended campaigns by their labels, one of them hostile."""
     posted = {
         label: service.post(label=label, families=["low"], methods=["random"], seeds=[5], budget={"episodes": 1})
         for label in (HOSTILE, "one more")

@@ -1,4 +1,4 @@
-"""A campaign's methods against each other, campaigns beside each other, and the printed report."""
+"""Methods and campaigns side by side, and the printed report."""
 
 import csv
 import json
@@ -17,7 +17,7 @@ from tests.web.conftest import CAMPAIGN, COLOURS, PHONE, count
 
 @pytest.fixture(scope="session")
 def methods(service: Service) -> str:
-    """A finished campaign of two methods and two seeds, so that its report has tests; its label is hostile."""
+    """Finished campaign of two methods and seeds, with a hostile label."""
     posted = service.post(
         label="<img src=x onerror=alert(1)> night",
         families=["low"],
@@ -170,7 +170,7 @@ def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:
 
 
 def _kinds_in(row: dict[str, Any]) -> list[str]:
-    """Texts of the headline, the distinct and the preventable kinds of a row."""
+    """Returns a row's texts of headline, distinct and preventable kinds."""
     headline, preventable = count(row["headline"]), count(row["distinct_preventable"])
     published = "" if row["headline"] is None else f" ({count(row['headline_published'])})"
     return [

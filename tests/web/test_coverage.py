@@ -1,4 +1,4 @@
-"""The coverage matrix: cells with their states, and what is behind a chosen one."""
+"""Coverage matrix: cells with states, and the details of a chosen one."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,7 +28,7 @@ PAIR = CoveredPair(
 
 
 def matrix() -> CoverageMatrix:
-    """Of two campaigns: in the first body of the ego one failed, in the second none did."""
+    """Matrix of two campaigns: one failed in the ego's first body."""
     empty = merged([])
     behind = {"families": ("low",), "campaigns": ("c1", "c2")}
     groups = []
@@ -77,7 +77,7 @@ FAILED, PLAYED, *_ = next(group for group in MATRIX.groups if group.name == "bod
 
 @pytest.fixture
 def page(new_page: Callable[..., Page], service: Service) -> Callable[..., Page]:
-    """Opens the coverage of a project, with what the service would answer of these campaigns."""
+    """Opens a project's coverage, with the service's answer replaced by `MATRIX`."""
 
     def answer(route: Route) -> None:
         route.fulfill(body=wire(MATRIX), content_type="application/json")

@@ -1,4 +1,4 @@
-"""The screen of failures: cards, plots and filters over what the service found."""
+"""Screen of failures: cards, plots and filters over the service's data."""
 
 import json
 import re
@@ -60,7 +60,7 @@ def wait_for(page: Page, number: int) -> None:
 
 
 def kinds_of(table: dict[str, Any]) -> list[int]:
-    """The episode that each kind of the campaign is shown by: one of the headline, else the worst."""
+    """Returns each kind's shown episode: one of the headline, else the worst."""
 
     def order(i: int) -> tuple[Any, ...]:
         severity = ["severe", "moderate", None, "minor"].index(table["severity"][i])

@@ -1,4 +1,4 @@
-"""Verdicts on the scenes of a story-sweep, on the screen of its campaign."""
+"""Verdicts on a story-sweep's scenes, on the screen of its campaign."""
 
 import re
 from collections.abc import Callable

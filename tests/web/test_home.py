@@ -1,4 +1,4 @@
-"""The start page: the egos with their newest results, or the first steps."""
+"""Start page: egos with their newest results, or the first steps."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Maps of one's own on the page: from a file to a campaign at one of its places."""
+"""A user's maps on the page: from file to campaign."""
 
 import json
 import re

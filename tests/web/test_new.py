@@ -1,4 +1,4 @@
-"""The form of a new campaign: what it sends is what it shows, and what is wrong stands beside its field."""
+"""Form of a new campaign: sends what it shows, faults by field."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The rates of a campaign: estimated ones with their interval, and why others are not."""
+"""Rates of a campaign: estimates with intervals, or why there are none."""
 
 from collections.abc import Callable
 from typing import Any
@@ -31,7 +31,7 @@ RATES = Rates(
 
 @pytest.fixture
 def page(new_page: Callable[..., Page], service: Service, campaign: str) -> Callable[..., Page]:
-    """Opens a campaign whose second run has the method `rate`, with what the service would answer of its rates."""
+    """Opens a campaign with a run of `rate` and given rates."""
 
     def answer(route: Route) -> None:
         asked = 12.0 if "exposure=12" in route.request.url else None

@@ -1,4 +1,4 @@
-"""A failure, played again: what is drawn equals what was recorded, frame by frame and between frames."""
+"""Replay of a failure: drawn as recorded, at and between frames."""
 
 import json
 from collections.abc import Callable
@@ -17,7 +17,7 @@ LATE_DRIVERS = ("idle", "careful")
 
 @pytest.fixture(scope="module")
 def failure(service: Service, campaign: str) -> dict[str, Any]:
-    """A failure in full, with the path of its place in the page."""
+    """Returns a failure in full, with its path on the page."""
     listed = service.get(campaign, "/failures", limit=200)["items"]
     chosen = max(listed, key=lambda each: (each["repetition"] is not None, each["id"].startswith("mixed")))
     known = service.get(campaign, f"/failures/{chosen['id']}")
@@ -53,7 +53,7 @@ def go_to(page: Page, time_s: float) -> dict[str, Any]:
 
 
 def assert_as_recorded(drawn: dict[str, Any], series: dict[str, Any], time_s: np.ndarray) -> None:
-    """Centres on the line between two frames, headings by the shorter turn; numpy's own, not the page's."""
+    """Checks centres and headings, interpolated by numpy, independent of the page."""
     now = drawn["time_s"]
     seen = {actor["id"]: actor for actor in drawn["actors"]}
     for i, name in enumerate(series["ids"]):

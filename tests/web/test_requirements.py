@@ -1,4 +1,4 @@
-"""Failures without contact on every screen, of a campaign whose episodes violate a requirement of its own."""
+"""Failures without contact on every screen, by a campaign's own requirement."""
 
 import json
 import re
@@ -25,7 +25,7 @@ def fast(service: Service) -> str:
 
 @pytest.fixture(scope="module")
 def valid(service: Service, fast: str) -> int:
-    """The number of episodes with a valid violation; what an ego inherits and ends within 5 s is none."""
+    """Counts valid violations; those inherited and ended within 5 s are none."""
     counted = int(service.get(fast)["requirements"]["never_fast"]["valid"])
     assert 9 <= counted <= 12
     return counted

@@ -1,4 +1,4 @@
-"""Every screen keeps the rules of accessibility in both themes and fits every width."""
+"""Every screen is accessible in both themes and fits every width."""
 
 from collections.abc import Callable
 
@@ -95,7 +95,7 @@ RING = """() => {
 
 
 def contrast(one: str, other: str) -> float:
-    """The contrast of two colours such as #0b5a94 or #fff, by WCAG 2."""
+    """Returns the contrast of two colours (#0b5a94, #fff) by WCAG 2."""
 
     def luminance(colour: str) -> float:
         if len(colour) == 4:
@@ -161,7 +161,7 @@ def test_a_screen_is_accessible_and_fits_every_width(
 
 
 def check_buttons(page: Page, check_axe: Callable[..., None]) -> None:
-    """Checks the contrast of every button's text and focus ring, under the pointer and in focus, in both themes."""
+    """Checks the contrast of every button's text and focus ring."""
     session = page.context.new_cdp_session(page)
     for domain in ("DOM", "CSS"):
         session.send(f"{domain}.enable")

@@ -1,4 +1,4 @@
-"""What stands around every screen: where the page is, keys, a lost server, themes."""
+"""Around every screen: the page's address, keys, a lost server, themes."""
 
 import gzip
 import subprocess

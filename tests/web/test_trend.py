@@ -1,4 +1,4 @@
-"""An ego over its versions: the table to choose from, the charts, and the marker where unlike would be compared."""
+"""An ego over its versions: table, charts, and markers between unlike ones."""
 
 import json
 from collections.abc import Callable

@@ -79,7 +79,7 @@ class Attendant:
         return str(ray.get_runtime_context().get_node_id())
 
     def poll(self, wait_s: float) -> tuple[list[Event | Exited], Files]:
-        """Returns messages since the last call and files written before them, waiting up to `wait_s` for a message."""
+        """Returns new messages and files written before them; waits up to `wait_s`."""
         heard = self._local.events(wait_s)
         if heard and not isinstance(heard[-1][1], Exited):
             time.sleep(GATHER_S)
@@ -97,7 +97,7 @@ class Attendant:
         self._local.cancel(1, grace_s)
 
     def _changed(self, final: bool) -> Files:
-        """New and replaced files, and from time to time those that have only grown.
+        """Returns new and replaced files, and at intervals those that only grew.
 
         It looks again after reading, so that a checkpoint comes with every file that was written before it.
         """
@@ -124,7 +124,7 @@ class Attendant:
 
 
 class RolloutAttendant:
-    """Ray's actor for one rollout process; it starts one that dies again, see `Rollouts`."""
+    """Ray's actor of one rollout process, which it restarts: see `Rollouts`."""
 
     def begin(self, order: Order, number: int, terms: bytes, beside: Files, expected: Versions) -> None:
         """Prepares the process of that number.
@@ -141,7 +141,7 @@ class RolloutAttendant:
         self._rollouts = Rollouts(pickle.loads(terms), self._scratch, 1, first=number)
 
     def play(self, proposal: bytes | None, wait_s: float) -> bytes | None:
-        """Returns what was played of the latest proposal, waiting up to `wait_s`; None: it is not played yet."""
+        """Returns what was played of the latest proposal; None after `wait_s`."""
         if proposal is not None:
             self._proposal = pickle.loads(proposal)
             self._rollouts.submit(self._proposal)
@@ -158,7 +158,7 @@ class RolloutAttendant:
 
 
 class RolloutRelays:
-    """Connections of a worker to its rollout processes elsewhere, and a thread for each."""
+    """Connections of a worker to rollout processes elsewhere, a thread for each."""
 
     def __init__(self, order: Order, beside: Files, expected: Versions) -> None:
         self._order, self._beside, self._expected = order, beside, expected
@@ -166,7 +166,7 @@ class RolloutRelays:
 
     @contextmanager
     def opened(self) -> Iterator[tuple[int, ...]]:
-        """Opens a connection for each slot but the first; gives the worker's ends, which are closed afterwards."""
+        """Opens a connection per slot but the first; yields the worker's ends."""
         ends = []
         for number in range(1, self._order.slots):
             own, other = Pipe()
@@ -226,7 +226,7 @@ class RolloutRelays:
             ray.kill(actor)
 
     def _played(self, actor: Any, proposal: bytes, worker: Connection) -> bytes:
-        """Waits for what an actor plays; each of its reports has to come within the lease."""
+        """Waits for an actor's episode; each report must come within the lease."""
         lease_s = self._order.settings.ray_lease_s
         wait_s = min(LOOK_S, lease_s / BEATS)
         asked: bytes | None = proposal

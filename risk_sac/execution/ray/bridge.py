@@ -1,4 +1,4 @@
-"""`python -m risk_sac.execution.ray.bridge FD`: the process that knows Ray, between the server and the cluster.
+"""`python -m risk_sac.execution.ray.bridge FD`: process between server and Ray cluster.
 
 Ray ends the process that uses it when its cluster has been lost for a minute. So the server does not use it: it talks
 to this process, and starts another one when this one has ended. The end of the connection `FD` ends this process, and
@@ -109,7 +109,7 @@ def _check_head(address: str) -> None:
 
 
 def _check_nodes(settings: RaySettings) -> None:
-    """Tries every node that has room: its versions, and its folder for attempts."""
+    """Checks versions and scratch folder of every node that has room."""
     able = [node for node in nodes(settings) if node.slots]
     if not able:
         got = f"{settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run"
@@ -169,7 +169,7 @@ class Attempt:
         return time.monotonic() - self._heard_at
 
     def stop(self, grace_s: float) -> None:
-        """Tells its worker to stop; kills the actor of one that does not obey in time."""
+        """Tells its worker to stop; kills the actor after the grace time."""
         if self.node is None:
             self.task.cancel()
         else:
@@ -196,7 +196,7 @@ class Attempt:
         self._say("said", self._order.number, self._order.id, [exited])
 
     async def _followed(self) -> Exited:
-        """Passes on its words, after the files that were written before them; returns its end."""
+        """Passes on messages after the files written before them; returns the end."""
         order = self._order
         beside: Files = {name: path.read_bytes() for name, path in order.beside.items()}
         seed = await asyncio.to_thread(read, order.folder)
@@ -246,7 +246,7 @@ class Bridge:
         self._server.send((kind, *content))
 
     async def carry(self) -> None:
-        """Acts on what the server says until it has gone, and tells of the cluster every few seconds.
+        """Executes the server's orders until it leaves; reports the cluster every `NODES_S`.
 
         Raises:
           TimeoutError: the head is silent, with which a cluster dies.

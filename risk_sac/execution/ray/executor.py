@@ -82,7 +82,7 @@ class RayExecutor:
                 self._lose(order)
 
     def _order(self, number: int, spec: RunSpec, folder: Path, slots: int) -> Order:
-        """An attempt, with the egos that the server's operator has registered and the run's scenario."""
+        """Returns an attempt's order, with registered egos and the run's scenario."""
         beside: dict[str, Path] = {}
         if registered := os.environ.get(registry.FILE):
             beside[EGOS] = Path(registered).resolve()

@@ -1,4 +1,4 @@
-"""An attempt at a run, as it is sent to a node, and the node's versions and folders."""
+"""Order of an attempt at a run; a node's versions and folders."""
 
 import contextlib
 import os
@@ -43,7 +43,7 @@ class Order:
 
     @property
     def id(self) -> str:
-        """Of this attempt and no other, of this server or an earlier one."""
+        """Unique id of the attempt, across this and earlier servers."""
         return self.scratch.name
 
     def environment(self, scratch: Path) -> dict[str, str]:
@@ -75,7 +75,7 @@ def check(scratch: Path, expected: Versions) -> None:
 
 
 def signatures(folder: Path) -> dict[str, tuple[int, int, int]]:
-    """Inode, size and time of each file of a folder, by its path in it."""
+    """Returns inode, size and time of each file, by its relative path."""
     signature_by_path = {}
     for parent, _, names in os.walk(folder):
         for name in names:
@@ -101,7 +101,7 @@ def write(folder: Path, files: Files) -> None:
 
 
 def versions() -> Versions:
-    """Of Python, of packages, and of the egos that are installed, on this machine."""
+    """Returns the versions of Python, packages and installed egos here."""
     version_by_name = {"python": ".".join(map(str, sys.version_info[:3]))}
     for name in PACKAGES:
         try:

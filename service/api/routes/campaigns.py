@@ -99,7 +99,7 @@ async def post_campaign(
 
 @router.post("/check", responses=MALFORMED | WRONG_TYPE, openapi_extra=EITHER_KIND)
 async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
-    """Validate a campaign and change nothing; says which values its episodes would use, and what its budget detects."""
+    """Validate a campaign without storing it; returns adjusted values and power."""
     checked = await run_in_threadpool(service.manager.checked, spec)
     await service.priors.of(spec, caller.project, caller.key_id)
     return CampaignCheck(adjustments=await run_in_threadpool(adjustments, checked), power=power_of(checked, ()))
@@ -150,7 +150,7 @@ def list_campaigns(
 
 @router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
 def cancel_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Stop a campaign and keep its results; no effect once it has ended."""
+    """Stop a campaign and keep its results; no effect after its end."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
     return _accepted(request, campaign, service)
 
@@ -205,7 +205,7 @@ def get_results(campaign_id: str, request: Request, service: Service, caller: Cu
 
 @router.get("/{campaign_id}/power", response_model=Power, responses=UNKNOWN | LIVE)
 def get_power(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Number of known defects that this budget detects, by stored runs of a benchmark."""
+    """Number of known defects that this budget detects, from a stored benchmark."""
     return _live(campaign_id, request, service, caller, lambda found: power_of(found.spec, played(found)))
 
 
@@ -221,13 +221,13 @@ async def get_failure_table(
 async def get_curves(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
 ) -> Response:
-    """Curves of each run: rates, distinct failures, λ and cost over its episodes."""
+    """Curves of each run over its episodes: rates, distinct failures, λ, cost."""
     return await _viewed(campaign_id, request, service, caller, name="curves", points=points)
 
 
 @router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE)
 async def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Scene parameters that set failing episodes apart, and parts of the ODD that were played."""
+    """Scene parameters that set failing episodes apart, and ODD parts played."""
     return await _viewed(campaign_id, request, service, caller, name="scenes")
 
 
@@ -250,7 +250,7 @@ async def get_grid(
         Query(max_length=2, description="The two parameters of the picture; without them the first two that vary."),
     ] = (),
 ) -> Response:
-    """The standard's verdict on each scene of a run of `story-sweep`, `story-random` or `story-bo`."""
+    """Verdicts on each scene of a `story-sweep`, `story-random` or `story-bo` run."""
     fields = {"run": run_id, "format": format_, "standard": standard, "over": over}
     return await _viewed(campaign_id, request, service, caller, name="grid", media_type=MEDIA_TYPES[format_], **fields)
 
@@ -264,7 +264,7 @@ def get_log(
     caller: CurrentCaller,
     lines: Annotated[int, Query(ge=1, le=1000, description="At most; fewer where they are long.")] = 200,
 ) -> Response:
-    """Last lines that a run's workers printed, without the server's folders; empty before the first."""
+    """Last lines that a run's workers printed, without the server's folders."""
     run_of(service.store.campaign(campaign_id, caller.sees), run_id)
     text = log_tail(service.settings.run_folder(campaign_id, run_id) / LOG, lines).encode()
     return PlainTextResponse(text, headers=cacheable(request, _digest(text)))
@@ -274,7 +274,7 @@ def get_log(
     "/{campaign_id}/runs/{run_id}/boundary", response_model=BoundaryMap, responses=UNKNOWN | TAGGED | NO_BOUNDARY
 )
 def get_boundary(campaign_id: str, run_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Boundary between passing and failing that a run of the method `boundary` found."""
+    """Boundary between passing and failing that a run of `boundary` found."""
     content = _boundary(run_of(service.store.campaign(campaign_id, caller.sees), run_id), BOUNDARY, service)
     return Response(content, headers=cacheable(request, _digest(content)), media_type="application/json")
 
@@ -346,7 +346,7 @@ async def _viewed(
     media_type: str = MEDIA_TYPES["json"],
     **fields: Any,
 ) -> Response:
-    """An answer that reads all episodes of a campaign, which the cache keeps."""
+    """Answers with a cached view that reads all episodes of a campaign."""
     campaign, headers, revision = await run_in_threadpool(_current, campaign_id, request, service, caller)
     view = CampaignView(name=name, campaign_id=campaign_id, edition=campaign.revision, **fields)
     content = await service.views.content(view, campaign, caller.key_id)
@@ -356,7 +356,7 @@ async def _viewed(
 def _current(
     campaign_id: str, request: Request, service: Context, caller: Caller
 ) -> tuple[StoredCampaign, dict[str, str], str]:
-    """Returns the campaign, the headers of an answer about it, and its revision before it was read."""
+    """Returns the campaign, the answer's headers, and the revision read before it."""
     revision = service.store.revision(campaign_id, caller.sees)
     campaign = service.store.campaign(campaign_id, caller.sees)
     # The revision that was read, which may be newer. A body depends on it, on the version and on how many are at work.

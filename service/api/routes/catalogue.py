@@ -230,7 +230,7 @@ def list_formats() -> ExportFormats:
 
 @router.get("/egos")
 def list_egos() -> Egos:
-    """Drivers of the ego: SUMO's models by profile, and egos that the operator has registered; and known faults."""
+    """Drivers of the ego: SUMO's profiles and registered egos; and known faults."""
     models = [
         EgoDrivers(
             name=name,
@@ -257,7 +257,7 @@ def get_trend(
         Query(max_length=50, description="Only these campaigns, all of the same scenarios; none: all of the ego."),
     ] = None,
 ) -> Response:
-    """Versions of an ego: headline kinds, rates and requirements, on equal terms in each row."""
+    """Versions of an ego: headline kinds, rates and requirements, on equal terms."""
     revision = service.store.revision_of_all()
     body = wire(trend_of(service.store, service.settings, name, campaign or (), caller.sees))
     headers = {"Cache-Control": "no-cache", "ETag": entity_tag(blake2b(body, digest_size=8).hexdigest())}
@@ -266,7 +266,7 @@ def get_trend(
 
 @router.get("/methods")
 def list_methods() -> Methods:
-    """Search methods as rows of a table, with what an episode of each costs."""
+    """Search methods, with what an episode of each costs."""
     names = [*USUAL, *(name for name in named_methods() if name not in USUAL)]
     return Methods(items=[_method(name) for name in names])
 
@@ -276,6 +276,6 @@ def _method(name: MethodName) -> NamedMethod:
 
 
 def _told(record: type[R], row: object, **named: object) -> R:
-    """The record of a row of a table; `named`: what the row itself does not say."""
+    """Returns the record of a table's row; `named`: fields that it lacks."""
     said = {name: getattr(row, name) for name in record.model_fields.keys() - named.keys()}
     return record.model_validate(said | named)

@@ -173,7 +173,7 @@ def put_triage(
     service: Service,
     caller: CurrentCaller,
 ) -> Triage:
-    """Store the triage of a failure, replacing an earlier one; it is deleted with the campaign."""
+    """Store a failure's triage, replacing an earlier one; deleted with the campaign."""
     return service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
 
 
@@ -209,7 +209,7 @@ Headers = Annotated[dict[str, str], Depends(_headers)]
 
 @router.get("/failures/{failure_id}/roads", response_model=RoadsBody, responses=TAGGED)
 def get_roads(failure: Asked, headers: Headers) -> Response:
-    """Ground of a failure as polygons, in the coordinates of its time series."""
+    """Ground of a failure as polygons, in its time series' coordinates."""
     return Response(roads_body(failure).model_dump_json(), headers=headers, media_type=JSON)
 
 
@@ -219,38 +219,38 @@ def get_roads(failure: Asked, headers: Headers) -> Response:
     responses=TAGGED | LOST | {200: made(SVG)[200]},
 )
 def get_thumbnail(failure: Asked, headers: Headers, service: Service) -> Response:
-    """Small picture of a failure from above: roads, paths of the last 3 s, bodies."""
+    """Small picture of a failure from above, with its last 3 s."""
     return Response(thumbnail_of(failure, service.settings), headers=headers, media_type=SVG)
 
 
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=made(PNG))
 async def get_picture(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """Picture of a failure, valid or not: paths from above, and measured series."""
+    """Picture of a failure, valid or not: paths and measured series."""
     return Response(await service.pictures.get(Picture(failure), caller.key_id), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_bundle(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """Self-contained file of a failure, made after a replay; `risk-sac replay` plays it anywhere."""
+    """File of a failure that `risk-sac replay` plays anywhere; made after replaying."""
     return Response(await service.studies.get(Study(failure, "bundle"), caller.key_id), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_core(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """The failure reduced to what it needs; takes up to 150 episodes, some 10 s."""
+    """Failure reduced to what it needs; up to 150 episodes (10 s)."""
     return Response(await service.studies.get(Study(failure, "core"), caller.key_id), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/most-plausible.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_most_plausible(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """The least unlikely motion that still fails, and the recording; takes up to 300 episodes, some 20 s."""
+    """Recording and least unlikely failing motion; up to 300 episodes (20 s)."""
     study = Study(failure, "most-plausible")
     return Response(await service.studies.get(study, caller.key_id), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=made(JSON) | PLAYED)
 async def get_region(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """Share of its neighbours that fail alike: nearby scenes, other traffic, other actions; takes 170 episodes."""
+    """Share of neighbours (scenes, traffic, actions) that fail alike; takes 170 episodes."""
     return Response(
         await service.studies.get(Study(failure, "region"), caller.key_id), headers=headers, media_type=JSON
     )
@@ -258,7 +258,7 @@ async def get_region(failure: Asked, headers: Headers, service: Service, caller:
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=made(PNG) | PLAYED)
 async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """Picture of a failure beside the same scene without an attack (`idle`) or with another ego."""
+    """Picture of a failure beside its twin: unattacked (`idle`) or another ego."""
     played = await service.studies.get(Study(failure, "twin", twin), caller.key_id)
     return Response(
         await service.pictures.get(Picture(failure, twin, played), caller.key_id), headers=headers, media_type=PNG
@@ -269,7 +269,7 @@ async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Servic
 async def get_twin_play(
     failure: Asked, twin: Twin, headers: Headers, service: Service, caller: CurrentCaller
 ) -> Response:
-    """Outcome and time series of the same scene without an attack (`idle`) or with another ego."""
+    """Outcome and series of a twin: unattacked (`idle`) or with another ego."""
     played = await service.studies.get(Study(failure, "twin", twin), caller.key_id)
     body = await run_in_threadpool(lambda: wire(twin_body(twin, played)))
     return Response(body, headers=headers, media_type=JSON)

@@ -71,7 +71,7 @@ async def get_events(
     last_event_id: LastEventId = None,
     newest: Newest = None,
 ) -> Response:
-    """Stream of server-sent events: episodes, failures and state changes, all or those after the last one received."""
+    """Server-sent events (episodes, failures, states): all, or after the last received."""
     position, ended = await run_in_threadpool(_start, service.store, campaign_id, caller.sees, last_event_id, newest)
     if position is None:
         return Response(status_code=204)
@@ -88,7 +88,7 @@ async def get_events(
 def _start(
     store: Store, campaign_id: str, project: str | None, event_id: str | None, newest: int | None
 ) -> tuple[int | None, bool]:
-    """Returns the first position, None if all was sent, and whether the campaign has ended."""
+    """Returns the start position, None if all sent, and whether it ended."""
     store.campaign(campaign_id, project)  # 404 unless the caller may see it
     position = _position(store, campaign_id, event_id, newest)
     if position is None:

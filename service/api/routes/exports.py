@@ -54,7 +54,7 @@ EpisodesFormat = Annotated[
 async def get_export(
     failure: Asked, format: FailureFormat, headers: Headers, service: Service, caller: CurrentCaller
 ) -> Response:
-    """One failure in a format of `GET /v1/formats`; several files come as a zip."""
+    """One failure in a format of `GET /v1/formats`; several files as zip."""
     content = await service.studies.get(Study(failure, "export", format=format), caller.key_id)
     row = FORMATS[format]
     name = f"{failure.episode.id}-{failure.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
@@ -70,7 +70,7 @@ async def get_export(
 async def get_episodes_export(
     campaign: AskedCampaign, format: EpisodesFormat, service: Service, caller: CurrentCaller
 ) -> Response:
-    """All episodes so far as a table in a format of `GET /v1/formats`."""
+    """All episodes so far as a table, in a format of `/v1/formats`."""
     folders = [service.settings.run_folder(campaign.id, run.id) for run in campaign.runs]
     table = await run_in_threadpool(EpisodeTable.of, folders, format)
     if not table.folders:

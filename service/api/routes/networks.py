@@ -102,7 +102,7 @@ def get_network(network_id: str, service: Service, caller: CurrentCaller) -> Net
 
 @router.get("/{network_id}/places", responses=UNKNOWN | FINDING | SEARCHING)
 def get_places(network_id: str, response: Response, service: Service, caller: CurrentCaller) -> Places:
-    """Places where the patterns fit, and reasons elsewhere; searched at the first request."""
+    """Places where the patterns fit, and reasons elsewhere; searched at first request."""
     places = service.surveys.places(network_id, caller.sees)
     if places.progress < 1:
         response.status_code = HTTPStatus.ACCEPTED

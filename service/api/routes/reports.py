@@ -82,7 +82,7 @@ async def get_table(
     campaign: AskedCampaign,
     format_: Annotated[TableFormat, Query(alias="format")] = "json",
 ) -> Response:
-    """Comparison of methods over the seeds of finished runs; names the missing runs."""
+    """Comparison of methods over the finished runs' seeds; names missing runs."""
     address = str(request.base_url)
     return await reported(request, service, campaign, "table", format_, format=format_, address=address)
 
@@ -96,7 +96,7 @@ async def get_rates(
         float | None, Query(ge=0, le=MOST_PER_HOUR, description="Scenes in an hour, for rates per hour.")
     ] = None,
 ) -> Response:
-    """Failure rates under the declared distributions, of finished runs of the method `rate`.
+    """Failure rates under declared distributions, of finished runs of `rate`.
 
     Each rate is one of its scenario, not of the road. One that fails a check is null, and says why.
     """
@@ -105,7 +105,7 @@ async def get_rates(
 
 @router.get("/clusters", response_model=Clusters, responses=TAGGED)
 async def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
-    """Kinds of failures that the finished runs found, in words, with an example of each."""
+    """Kinds of failures of the finished runs, with an example of each."""
     return await reported(request, service, campaign, "clusters", "clusters")
 
 
@@ -131,7 +131,7 @@ async def get_figure(
 
 @router.get("/spec", response_model=CampaignSpec, responses=SPEC)
 def get_spec(campaign: AskedCampaign, format_: Annotated[SpecFormat, Query(alias="format")] = "json") -> Response:
-    """Spec of the campaign: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
+    """Spec of the campaign: JSON to post, or YAML for `--spec`."""
     return Response(SPECS[format_](campaign.spec), media_type=MEDIA_TYPES[format_])
 
 
@@ -145,7 +145,7 @@ async def reported(
     format: str = "json",
     **fields: Any,
 ) -> Response:
-    """Answers with a view of the report, or one of its figures; `parts` as in `cacheable`."""
+    """Answers with a report's view or figure; `parts` as in `cacheable`."""
     edition = await run_in_threadpool(service.reports.edition, campaign)
     headers = cacheable(request, edition, *parts)
     asked = CampaignView(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
@@ -174,7 +174,7 @@ async def get_report(
         str | None, Query(max_length=200, description="Id of a regression of this campaign, to be told of in it.")
     ] = None,
 ) -> Response:
-    """Evidence of a campaign: test cases, funnel, bounds, coverage and the digests of all inputs, as JSON.
+    """Evidence of a campaign: test cases, funnel, bounds, coverage and input digests.
 
     As one page or as Markdown it has pictures, limits and a command for each number, too.
     Search results are no crash rate: bounds come from the i.i.d. phase alone, and there are none without one.
@@ -222,7 +222,7 @@ async def get_project_coverage(
     ] = None,
     limit: Annotated[int, Query(ge=1, le=MOST_MERGED, description="Newest campaigns to be merged.")] = MOST_MERGED,
 ) -> Response:
-    """Coverage of the newest campaigns of a project, cell by cell; each cell names the campaigns behind it.
+    """Coverage of a project's newest campaigns; each cell names its campaigns.
 
     Campaigns of different egos are merged too, unless `ego` picks one: what one ego kept, another need not.
     """
@@ -270,7 +270,7 @@ async def post_regression(
     service: Service,
     caller: CurrentCaller,
 ) -> CampaignRegression:
-    """Play the distinct failures of a campaign against another ego; the same request returns the existing one."""
+    """Play a campaign's distinct failures against another ego; idempotent."""
     campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
     regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego, caller.key_id)
     response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
@@ -279,6 +279,6 @@ async def post_regression(
 
 @regressions_router.get("/{regression_id}", responses=UNKNOWN)
 def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> CampaignRegression:
-    """Verdict of each failure: fixed, still failing, a new kind, flaky, or not comparable, with the reason."""
+    """Verdict of each failure: fixed, still failing, new kind, flaky, not comparable."""
     service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
     return service.regressions.get(regression_id)

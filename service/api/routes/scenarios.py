@@ -113,7 +113,7 @@ def get_scenario(scenario: str, service: Service, caller: CurrentCaller) -> Scen
 
 @router.get("/{scenario}/picture.png", response_class=Response, responses=UNKNOWN | DRAWN)
 async def get_scenario_picture(scenario: str, service: Service, caller: CurrentCaller) -> Response:
-    """Picture of a scenario from above: how it begins, and where its actors may start."""
+    """Picture of a scenario's beginning from above, with actors' possible starts."""
     await run_in_threadpool(service.scenarios.get, scenario, caller.sees)
     return Response(await service.scenario_pictures.get(scenario, caller.key_id), media_type="image/png")
 

@@ -1,4 +1,4 @@
-"""The server itself: entry point, API description, web page, health, and with a key metrics, workers and queue."""
+"""Routes of the server: entry, description, page, health, metrics, workers and queue."""
 
 import json
 from functools import lru_cache
@@ -53,7 +53,7 @@ async def get_health(service: Service) -> Health:
 
 @router.get("/readyz", tags=["operations"], responses=UNREADY)
 def get_readiness(service: Service) -> Ready:
-    """Readiness: whether campaigns can be posted and progress; recovers once the cause is gone."""
+    """Readiness to take and run campaigns; recovers once the cause is gone."""
     problem = service.manager.storage_problem
     if problem is not None:
         raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, problem)
@@ -171,6 +171,6 @@ async def _missing(request: Request) -> Response:
 
 
 def page_routes() -> list[Route | Mount]:
-    """The files of `/docs`, and the page at `/page/` or a word on how to build it."""
+    """Returns routes of `/docs` and `/page/`; unbuilt, it says how to build."""
     shown = Mount("/page", _Page(directory=BUILT, html=True)) if BUILT.is_dir() else Route("/page/", _missing)
     return [Mount("/docs", StaticFiles(directory=ASSETS)), Route("/page", _to_page), shown]

@@ -1,4 +1,4 @@
-"""Egos for tests: one that drives well, and some that leave their lane, their road or the rules.
+"""Egos for tests: one drives well, others leave lane, road or rules.
 
 Put the folder above on `PYTHONPATH`: the `dist-info` beside this package registers its egos.
 """

@@ -1,4 +1,4 @@
-"""Egos that break a rule: they enter on red, or leave the road."""
+"""Egos that break a rule: entering on red or leaving the road."""
 
 from risk_sac.egos import Control, EpisodeStart, Perceived
 from risk_sac.world.types import HEADING, Signal
@@ -22,7 +22,7 @@ class RedRunner(Lqr):
 
 
 class OffRoader(Lqr):
-    """Steers off the road to the right where it has to brake hard, and rolls to a stop there."""
+    """Steers off the road to the right instead of braking hard."""
 
     version = "1.0"
     response_time_s = 0.3

@@ -1,4 +1,4 @@
-"""Egos that change lanes: to the next lane on the left, and back."""
+"""Egos that change to the next lane on the left, and back."""
 
 import math
 
@@ -31,7 +31,7 @@ class LaneChanger(Lqr):
 
 
 class Overtaker(LaneChanger):
-    """Drives in the next lane on the left from 2 s to 8 s, and comes back."""
+    """Drives in the next left lane from 2 s to 8 s."""
 
     version = "1.0"
     response_time_s = 0.3

@@ -1,4 +1,4 @@
-"""Well-behaved ego: LQR steering along the perceived path, IDM behind what is ahead, emergency braking."""
+"""Well-behaved ego: LQR steering along the path, IDM, and emergency braking."""
 
 import math
 from functools import lru_cache
@@ -42,7 +42,7 @@ class Lqr(Driver):
         return min(accel, -1.25 * needed) if needed > EMERGENCY_MPS2 else accel
 
     def steering_rad(self, perceived: Perceived, aside_m: float) -> float:
-        """Steering that takes the ego `aside_m` left of the path, the path's bend included."""
+        """Returns the steering that takes the ego `aside_m` left of the path."""
         p, car, speed = perceived, self.vehicle, float(perceived.state[SPEED, 0])
         station, offset_m, way = project(p.path, p.state[X, 0], p.state[Y, 0])
         preview_m = max(PREVIEW_S * speed, LEAST_PREVIEW_M)
@@ -55,7 +55,7 @@ class Lqr(Driver):
 
 @lru_cache
 def lqr_gains(speed_mps: int, wheelbase_m: float, step_s: float) -> np.ndarray:
-    """Gains on the errors of offset and heading, of a kinematic bicycle at this speed."""
+    """Returns gains on offset and heading errors of a kinematic bicycle."""
     a = np.array([[1.0, speed_mps * step_s], [0.0, 1.0]])
     b = np.array([[0.0], [speed_mps * step_s / wheelbase_m]])
     cost, effort = np.diag([1.0, 2.0]), np.array([[8.0]])

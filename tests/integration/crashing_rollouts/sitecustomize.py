@@ -1,4 +1,4 @@
-"""Makes rollout processes read address 0 in the eighth step of the third episode."""
+"""Makes rollout processes read address 0 in episode three, step eight."""
 
 import ctypes
 import sys

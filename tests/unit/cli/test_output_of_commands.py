@@ -1,4 +1,4 @@
-"""What the commands print: it fits 80 columns, and with --json it is one document."""
+"""Output of the commands: it fits 80 columns; --json prints one document."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Whatever the terminal takes, a command runs and ends with its own status."""
+"""Commands run and end with their own status, whatever the terminal."""
 
 import io
 import json

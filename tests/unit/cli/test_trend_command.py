@@ -14,7 +14,7 @@ from tests.builders import run_metrics
 
 
 def campaign(folder: Path, label: str, *, finished: bool = True, **changes: object) -> str:
-    """Writes a campaign of a version of idm-aeb without a failure, all of it replayed."""
+    """Writes a replayed campaign of a version of idm-aeb, without failures."""
     fields = {"families": ["low"], "methods": ["archive"], "ego": {"driver": "idm-aeb", "label": label}} | changes
     spec = CampaignSpec.model_validate(fields)
     for run in spec.runs():

@@ -1,4 +1,4 @@
-"""A real HTTP server on a loopback port that answers what the test tells it to."""
+"""HTTP server on a loopback port that gives a test's answers."""
 
 import json
 import threading
@@ -45,7 +45,7 @@ def campaign(state: str = "running", done: int = 0, **fields: Any) -> dict[str, 
 
 @dataclass
 class Answer:
-    """One answer; a list is a stream of events, in pieces, quiet for as long as a number says, broken off at a None."""
+    """Answer; a list streams events: numbers are pauses, None breaks off."""
 
     status: int = 200
     body: Any = None
@@ -63,7 +63,7 @@ class Asked:
 
 
 class Server(ThreadingHTTPServer):
-    """Gives its answers one after the other, and the last one for ever."""
+    """Server that gives its answers in turn and repeats the last one."""
 
     daemon_threads = True
 

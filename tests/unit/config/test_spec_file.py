@@ -1,4 +1,4 @@
-"""The i.i.d. phase of a campaign: an option that changes nothing where it is not asked for."""
+"""Spec files, encodings and flags, and the i.i.d. phase's runs."""
 
 import argparse
 import json

@@ -34,7 +34,7 @@ CONJUNCTIONS = {name for name, defect in DEFECTS.items() if defect.when}
 
 
 def seen(*actors: Actor, time_s: float = 1.5, speed: float = 10.0, turn: float = 0.0, **changes: Any) -> Perceived:
-    """What an ego perceives that drives by `speed` along a straight road which leads `turn` rad left of east."""
+    """Perception of an ego on a straight road, `turn` rad from east."""
     all_actors = (("ego", CAR, 0.0, 0.0, speed, 0.0), *actors)
     state = np.full((11, len(all_actors)), np.nan)
     cos, sin = math.cos(turn), math.sin(turn)

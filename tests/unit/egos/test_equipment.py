@@ -1,4 +1,4 @@
-"""Sensors err as their settings say, actuators follow with lag, and both are a part of the ego's version."""
+"""Sensors err as set, actuators lag, and both belong to ego versions."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Whatever an ego does is an episode that does not count, and no end of the run."""
+"""An ego's fault invalidates its episode and never ends the run."""
 
 import math
 import os
@@ -18,7 +18,7 @@ ROW = np.array([0.0, 1.0])
 
 
 class Answering:
-    """An ego that does the same in all that it is asked for."""
+    """Ego that gives the same answer to every call."""
 
     def __init__(self, answer):
         self.answer = answer

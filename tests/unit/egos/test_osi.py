@@ -1,4 +1,4 @@
-"""An ego that speaks ASAM OSI: literals by the `osi3` of osi-python 3.8.0, and an episode."""
+"""Ego that speaks ASAM OSI: literals by osi-python 3.8.0, and an episode."""
 
 import math
 from contextlib import closing
@@ -135,7 +135,7 @@ def test_what_is_no_motion_request_is_refused(nothing):
 
 
 class ByOsi(OsiEgo):
-    """Drives along its reference line at 8 m/s, told and telling in OSI alone."""
+    """Drives along its reference line at 8 m/s, by OSI messages only."""
 
     version = "1"
     response_time_s = 1.0

@@ -40,7 +40,7 @@ Other = Callable[[float], tuple[float, float, float]]  # its x, y and speed alon
 
 
 def two_lanes(*, right: bool = True, change: bool = True, stop_line: bool = False) -> Road:
-    """A straight road along x whose lane at y = 0 has a lane to the right or to the left, and goes on beyond 300 m."""
+    """Straight road along x with a lane beside, divided at 300 m."""
     side = -WIDTH_M if right else WIDTH_M
     names = ("own", "beside") if right else ("beside", "own")  # from left to right
     lanes = []

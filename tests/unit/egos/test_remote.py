@@ -1,4 +1,4 @@
-"""A session with an ego in another process, over a stream: what is late, out of turn or gone never drives."""
+"""Session with a remote ego: late, disordered or lost answers never count."""
 
 import math
 import subprocess

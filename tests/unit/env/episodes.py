@@ -1,4 +1,4 @@
-"""Random episodes of an environment, and whether two are the same to the last bit."""
+"""Random episodes of an environment, and whether two are bitwise equal."""
 
 import numpy as np
 

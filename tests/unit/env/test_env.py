@@ -246,7 +246,7 @@ def first_contacts(env: RiskSacEnv, wanted: int) -> list[list[Outcome]]:
 
 
 def reward_by_hand(series: dict[str, np.ndarray], step: int, config: RewardConfig, bonus: float) -> float:
-    """R_risk from the recorded time series alone, by the formulas of the paper."""
+    """Computes R_risk from recorded series alone, by the paper's formulas."""
     ahead = [j for j in range(1, len(series["ids"])) if is_ahead(series, step, j)]
     ttc = min([series["ttc_s"][step, j] for j in ahead], default=10.0)
     along = {j: series["rss_longitudinal_m"][step, j] for j in ahead}

@@ -63,7 +63,7 @@ def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs():
 
 
 def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_it_says_it_is():
-    """RSS decides which scenes are refused: by an ego's own time a slow one would be offered the milder ones."""
+    """RSS refuses scenes; by an ego's time, slow ones get milder scenes."""
     egos = [EgoConfig(reaction_time_s=t) for t in (0.1, 0.5, 1.0)]
     egos += [EgoConfig(driver=name) for name in ("rss", "idm-aeb", "broken", "r157")]
     egos += [EgoConfig(driver="rss", response_time_s=t) for t in (0.0, 5.0)]

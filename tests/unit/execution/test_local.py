@@ -1,4 +1,4 @@
-"""What is so of processes of this machine, beyond what every executor must pass."""
+"""Processes of this machine, beyond what every executor must pass."""
 
 import contextlib
 import json
@@ -125,7 +125,7 @@ FOREVER = 1e9
 
 
 def seconds_until_lost(lease, signs, watched_s=0.2):
-    """Time until the worker with these signs of life, one set after another, counts as lost; the last set stays."""
+    """Time until a worker with these signs is lost; the last repeats."""
     signs = list(signs)
     for count in range(1, 1000):
         if lease.passed(watched_s, signs.pop(0) if len(signs) > 1 else signs[0]):

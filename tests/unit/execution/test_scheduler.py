@@ -1,4 +1,4 @@
-"""The scheduler with the jobs of `evaluate` and real processes of this machine."""
+"""Scheduler with the jobs of `evaluate` and real processes of this machine."""
 
 import math
 

@@ -21,7 +21,7 @@ JUDGED = judgement(
 
 
 def synthetic_contact(judged: Judgement = JUDGED) -> RecordedFailure:
-    """The ego drives east at 10 m/s into a pedestrian that walks north; the contact is 1.95 s after the release."""
+    """Contact of an ego at 10 m/s eastward with a northward pedestrian."""
     space: SceneSpace = FAMILIES["mixed"].space
     hit = collision(
         time_s=1.95,
@@ -54,7 +54,7 @@ def synthetic_contact(judged: Judgement = JUDGED) -> RecordedFailure:
 
 
 def synthetic_series() -> dict[str, NDArray[np.generic]]:
-    """Ego, the pedestrian, and a bystander that leaves the net after one second."""
+    """Series of ego, pedestrian, and a bystander that leaves after one second."""
     t = np.arange(21) * 0.1
     zero, gone = np.zeros_like(t), np.where(t < 1.0, 0.0, np.nan)
     return {
@@ -86,7 +86,7 @@ def synthetic_series() -> dict[str, NDArray[np.generic]]:
 
 
 def with_release() -> dict[str, NDArray[np.generic]]:
-    """The same with 1.5 s before the release, in which the ego drives as it does after and all others stand."""
+    """Prepends 1.5 s before the release, in which only the ego drives."""
     series, early = synthetic_series(), 15
     count = len(series["time_s"])
     rows = {name: values for name, values in series.items() if values.ndim and len(values) == count}

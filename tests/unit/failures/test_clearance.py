@@ -11,7 +11,10 @@ Motion = Callable[[np.ndarray], np.ndarray]
 
 
 def scene(ego_mps: float, x_m: Motion, y_m: Motion, *, ego_stands_from_s: float = np.inf) -> Series:
-    """An ego along the x axis and one other car; time counts from the release, x and y from the ego's start."""
+    """Series of an ego along the x axis and one other car.
+
+    Time counts from the release, x and y from the ego's start.
+    """
     time = np.arange(STEPS) / 10
     speed = np.where(time < ego_stands_from_s, ego_mps, 0.0)
     ego_x = np.concatenate([[0.0], np.cumsum(speed[1:] / 10)])

@@ -176,7 +176,7 @@ ROWS = 41
 
 
 def encounter(*, kind: int = 0, x_m: float = 4.0, y_m: float = 3.2, heading: float = 0.0, **of_striker: Any) -> Any:
-    """Ego at 14 m/s eastward and a striker beside it, for 4 s with the release after the first half second."""
+    """Ego at 14 m/s eastward with a striker beside, for 4 s."""
     zero = np.zeros(ROWS)
     columns = {
         "x_m": (14.0 * np.arange(ROWS) / 10, 14.0 * np.arange(ROWS) / 10 + x_m),

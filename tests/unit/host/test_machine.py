@@ -137,7 +137,7 @@ print(time.process_time() - began_s, cpu_s() - counted_s)
 
 
 def test_a_budget_of_processor_time_is_not_spent_on_compilation(tmp_path):
-    """With an empty cache, as in a fresh clone, compilation takes most of the first call."""
+    """With an empty cache, compilation takes most of the first call."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     answer = subprocess.run(
         [sys.executable, "-c", FIRST_CALL], env=environment, capture_output=True, text=True, check=True

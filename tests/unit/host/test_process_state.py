@@ -1,4 +1,4 @@
-"""What foreign code does to its process holds for it, and not for us."""
+"""Foreign code changes its process's state for itself, not for us."""
 
 import gc
 import io

@@ -1,4 +1,4 @@
-"""A sweep of a folder has a row for each variation file and ego, and counts how its points ended."""
+"""Folder sweep: a row per variation file and ego, with counted outcomes."""
 
 from pathlib import Path
 

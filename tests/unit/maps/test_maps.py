@@ -185,7 +185,7 @@ RIGHT = '<connection from="b" to="c" fromLane="0" toLane="0" dir="s"/>'
 
 @pytest.mark.parametrize(("right", "comes_from"), [(RIGHT, []), ("", ["a"])])
 def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(tmp_path, right, comes_from):
-    """Of lanes that lead on alike, SUMO's drivers take the right one; of others the one that leads on."""
+    """Where lanes lead on alike, SUMO's drivers take the right one."""
     file = tmp_path / "map.net.xml"
     file.write_text(FORK.format(right=right))
     net = read_net(file)
@@ -195,7 +195,7 @@ def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(tmp
 
 @pytest.mark.parametrize(("x_m", "stands_clear"), [(0.0, True), (-6.0, False)])
 def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m, stands_clear):
-    """The middle of its front is 1.6 m from the middle of the lane that it is to cross, as SUMO has it."""
+    """Its front is 1.6 m from the middle of the lane crossed."""
 
     def lane(id_, *line):
         return NetLane(id_, id_, 0, 10.0, 3.2, 10.0, line, True)
@@ -283,7 +283,7 @@ def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(tmp_path
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(("radius_m", "reaches"), [(12.0, False), (0.5, True)])
 def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(radius_m, reaches, side):
-    """It turns away from a car that drives straight on 3.2 m beside it."""
+    """It turns away from a car that drives straight on beside it."""
     quarter = [math.radians(10.0 * i) for i in range(10)]
     arc = [(radius_m * math.sin(a), -side * radius_m * (1.0 - math.cos(a))) for a in quarter]
 
@@ -304,7 +304,7 @@ def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(ra
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("radius_m", [1.5, 4.0, 12.0])
 def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m, side):
-    """It drives north, 1.6 m from the kerb on its right or its left, and turns to that side behind the crossing."""
+    """It drives 1.6 m from the kerb and turns behind the crossing."""
     quarter = [math.radians(5.0 * i) for i in range(19)]
     arc = [(side * (-1.6 + radius_m * (1.0 - math.cos(a))), 2.0 + radius_m * math.sin(a)) for a in quarter]
     lines = [(-1.6 * side, -60.0), (-1.6 * side, 2.0)], arc, [arc[-1], (90.0 * side, arc[-1][1])]

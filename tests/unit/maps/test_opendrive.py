@@ -51,7 +51,7 @@ def read(folder: Path, content: str) -> tuple[Net, Converted]:
 
 
 def limits(net: Net) -> list[tuple[float, list[float]]]:
-    """Where the lanes of each edge begin, and their limits from left to right."""
+    """Returns each edge's begin and its lanes' limits from left to right."""
     found = [
         (edge.lanes[0].line[0][0], [round(lane.limit_mps, 2) for lane in edge.lanes[::-1]])
         for edge in net.edges.values()
@@ -126,7 +126,7 @@ def test_a_real_spiral_stays_one(tmp_path):
 
 
 def _drawn(folder: Path, bend: str, end: tuple[float, float, float]) -> Sequence[tuple[float, float]]:
-    """The lane of a road with a bend of 150 m between two straights of 300 m."""
+    """Returns the lane of a road with a bend between two straights."""
     x, y, heading = end
     plan = (
         '<geometry s="0" x="0" y="0" hdg="0" length="300"><line/></geometry>'

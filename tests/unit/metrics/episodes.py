@@ -1,4 +1,4 @@
-"""Episodes of a run, some by hand and any at all, and what a run makes of them."""
+"""Episodes of a run, by hand and random, and the run's counts."""
 
 import math
 from itertools import combinations

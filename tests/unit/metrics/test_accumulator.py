@@ -63,7 +63,10 @@ def test_implausible_kinds_are_counted_apart_from_candidates():
 
 
 def test_histogram_literals():
-    """Conflicts at 2.5 s twice, 3.0 s, 1.5 s and before the release; contacts at 3.9 s twice, at 6, 15 and 2 s."""
+    """Conflicts and contacts are counted by second.
+
+    Conflicts at 2.5 s twice, 3.0 s, 1.5 s and before the release; contacts at 3.9 s twice, at 6, 15 and 2 s.
+    """
     metrics = feed(JUDGED)
     assert metrics.conflicts_by_second == (1, 1, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
     assert metrics.contacts_by_second == (0, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1)

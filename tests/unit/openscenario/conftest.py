@@ -1,4 +1,4 @@
-"""Conversions of roads that take no time, where a test is about something else."""
+"""Stub of road conversions for tests that are about something else."""
 
 import pytest
 

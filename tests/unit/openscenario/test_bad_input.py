@@ -1,4 +1,4 @@
-"""What is wrong with a scenario is told by file, line and element."""
+"""Faults of a scenario are reported by file, line and element."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""Mutated files are imported, or refused in one line: no traceback, no hang, nothing left behind."""
+"""Mutated files are imported or refused in one line, leaving nothing behind."""
 
 import random
 import time
@@ -67,7 +67,7 @@ MUTATIONS: tuple[Callable[[ET.Element, random.Random], None], ...] = (
 
 
 def mutate(file: Path, draw: random.Random) -> None:
-    """Changes a file at up to four places of its tree, or its bytes."""
+    """Changes a file at up to four places of tree or bytes."""
     if draw.random() < 0.15:
         content = bytearray(file.read_bytes())
         for _ in range(draw.randint(1, 4)):

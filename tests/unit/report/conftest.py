@@ -62,7 +62,7 @@ NEWER = {
 
 @pytest.fixture
 def finished():
-    """Builds a run from one letter per episode, see `OUTCOMES`; every episode that is not rejected has 50 steps."""
+    """Builds a run from `OUTCOMES` letters; played episodes have 50 steps."""
 
     def build(spec, search, evaluation="", cpu_s=60.0):
         records = []

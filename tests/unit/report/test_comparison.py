@@ -1,4 +1,4 @@
-"""What a search had found when a budget was spent, counted by hand."""
+"""Comparison of methods at equal budgets, against counts by hand."""
 
 import math
 import subprocess
@@ -105,7 +105,7 @@ def test_report_loads_without_torch_and_libsumo():
 
 @pytest.fixture
 def run(spec, finished):
-    """F: a failure that no driver prevents, f: one that the careful driver prevents, r: a refused scene."""
+    """F: no driver prevents the failure; f: the careful driver; r: refused."""
     return replace(finished(spec.runs()[0], ".FrfFf", "f"), episode_cpu_s=(2.0, 4.0, 4.5, 9.0, 10.0, 12.0, 20.0))
 
 

@@ -72,7 +72,7 @@ SPEC = RunSpec.model_validate({"family": "low", "method": "iid-random", "seed": 
 
 
 def run_of(finished, letters, crashed=0):
-    """A run of an i.i.d. phase; in its last refused scenes the simulator died."""
+    """Run of an i.i.d. phase; in `crashed` refused scenes SUMO died."""
     run = finished(SPEC, letters)
     records = [record.model_copy(update={"phase": "iid"}) for record in run.records]
     refused = [place for place, record in enumerate(records) if record.outcome is Outcome.REJECTED]

@@ -1,4 +1,4 @@
-"""The standard's verdict on scenes: which it is, and how it is written."""
+"""The standard's verdict on scenes: its value, and how it is written."""
 
 import csv
 import io

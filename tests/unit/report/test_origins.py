@@ -1,4 +1,4 @@
-"""Where failures begin: as written, where parameters are searched, or where others deviate."""
+"""Origins of failures: as written, by searched parameters, or by deviating actors."""
 
 from risk_sac.config import RunSpec
 from risk_sac.records import Grade, Outcome, StoryDeviation
@@ -7,7 +7,7 @@ from tests.builders import collision, episode_record, judgement
 
 
 def run(method, *failures, **changes):
-    """A run with a safe episode, and a failure of each of these kinds."""
+    """Run with a safe episode and a failure of each given kind."""
     records = [episode_record(0, Outcome.SAFE)]
     for index, kind in enumerate(failures, 1):
         contact = collision(judgement=judgement(Grade.PREVENTABLE, kind=kind))

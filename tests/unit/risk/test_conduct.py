@@ -48,7 +48,7 @@ MERGE = Layout(
 
 
 def state_of(*bodies: dict[str, float]) -> np.ndarray:
-    """Columns of a frame; a body is a car on the x axis that drives along it unless it says otherwise."""
+    """Columns of a frame; bodies default to cars driving along x."""
     state = np.zeros((11, len(bodies)))
     for i, body in enumerate(bodies):
         usual = {"length": 4.6, "width": 1.8} | body
@@ -58,7 +58,7 @@ def state_of(*bodies: dict[str, float]) -> np.ndarray:
 
 
 class Played:
-    """One adversary beside an ego, in column 1, and what the cost remembers of it."""
+    """Adversary in column 1 beside an ego, with the cost's memory."""
 
     def __init__(self, kind: Kind = Kind.VEHICLE, road: RoadFacts = STREET) -> None:
         self.memory, self.road = np.zeros((CONDUCT_ROWS, 1)), road
@@ -90,7 +90,7 @@ def test_braking_costs_by_its_own_scale_whatever_the_limits():
 
 
 def pedals(swings: int) -> float:
-    """The term after so many changes between 2 m/s² and -4 m/s², a second each."""
+    """Term after `swings` changes between 2 and -4 m/s², a second each."""
     played = Played()
     for swing in range(swings + 1):
         terms = played.step(FAR | {"accel": 2.0 if swing % 2 else -4.0}, times=10)
@@ -187,12 +187,12 @@ def test_terms_add_up_and_count_less_far_from_the_ego():
 
 
 def turned(body: dict[str, float], angle: float) -> dict[str, float]:
-    """A body on the x axis, turned round the middle of the junction."""
+    """Turns a body on the x axis about the junction's middle."""
     return body | {"x": body["x"] * math.cos(angle), "y": body["x"] * math.sin(angle), "heading": angle}
 
 
 def entries(letter: str, wait_s: float, ego: dict[str, float], angle: float = 0.0, ego_link: str = "G") -> list[float]:
-    """The term of an entry and of each step afterwards, through the junction and out of it."""
+    """Terms of each step from an entry through the junction and out."""
     played = Played(road=JUNCTION)
     waits = turned({"x": -13.0, "speed": 0.0}, angle)
     links = {"waits": [ord(ego_link), ord(letter)], "goes": [ord(ego_link), 0]}

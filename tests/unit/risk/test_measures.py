@@ -1,4 +1,4 @@
-"""Literals are worked out by hand; the reference minimises over time by brute force."""
+"""Literals by hand; the reference minimises over time by brute force."""
 
 import math
 
@@ -35,7 +35,7 @@ def gauge() -> Gauge:
 
 
 def behind(gap_m: float) -> Frame:
-    """The ego at 10 m/s, and an actor that stands ahead of it."""
+    """The ego at 10 m/s, and an actor standing ahead of it."""
     return frame_of(x_m=[0.0, gap_m + 4.6], speed_mps=[10.0, 0.0])
 
 
@@ -70,7 +70,7 @@ Other = tuple[float, float, float, float, float]
 
 
 def view_of(ego_mps: float, other: Other) -> RelativeView:
-    """The ego at the origin, driving along x; the other is x, y, heading, vx, vy; both 4 m by 2 m."""
+    """Ego at the origin along x; other: x, y, heading, vx, vy."""
     x, y, heading, vx, vy = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), other]).T
     frame = frame_of(x_m=x, y_m=y, heading_rad=heading, vx_mps=vx, vy_mps=vy, length_m=4.0, width_m=2.0)
     return relative_view(frame)
@@ -157,7 +157,7 @@ def trace():
 
 
 def watch(formula: str, trace: list[dict[str, float]]) -> FormulaError | ValidationError | None:
-    """Watch a formula to the end; why it is refused, if it is, by an error that means a 422."""
+    """Monitors a formula to its end; returns the error that refuses it."""
     try:
         monitor = Monitor([Requirement(name="mine", formula=formula, scale=1.0)], STEP_S, STEPS)
     except (FormulaError, ValidationError) as error:

@@ -24,7 +24,7 @@ def measured(net: str, *frames: Frame) -> list[OwnMotion]:
 
 
 def at(net: str, *poses: Pose, speed_mps: Sequence[float] | float = 10.0, kind: Sequence[Kind] | None = None):
-    """The ego, 4.6 m by 1.85 m, at the first pose, and others."""
+    """Measures the ego, 4.6 m by 1.85 m, at the first pose."""
     x_m, y_m, heading_rad = zip(*poses, strict=True)
     speeds = np.broadcast_to(speed_mps, len(poses))
     return measured(net, frame_of(kind, x_m=x_m, y_m=y_m, heading_rad=heading_rad, speed_mps=speeds))[0]
@@ -163,7 +163,7 @@ def test_headway_is_the_time_gap_to_the_vehicle_that_is_followed(pose, kind, hea
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_headway_follows_the_bend(side):
-    """A leader 30 m ahead on an arc of 40 m radius; another vehicle is straight ahead, beside that arc."""
+    """The leader is 30 m ahead on the arc, another straight ahead."""
     radius_m, speed_mps, angle = 40.0, 10.0, side * 30.0 / 40.0
     leader = side * radius_m * math.sin(abs(angle)), side * radius_m * (1 - math.cos(angle))
     frames = []

@@ -38,7 +38,7 @@ OWN = OwnMotion(
 def frame_of(
     *others: tuple[float, float, Kind], speed_mps: float = 10.0, accel_mps2: float = 0.0, stop_line_m: float = math.inf
 ) -> Frame:
-    """The ego at the origin, driving along x, its body 4 m long; each other is x, y, kind, and stands."""
+    """Ego of 4 m at the origin; others stand: x, y, kind."""
     rest = [0.0] * len(others)
     return builders.frame_of(
         [VEHICLE, *(kind for _, _, kind in others)],

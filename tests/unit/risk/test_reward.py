@@ -70,7 +70,7 @@ def test_terminal_states_have_potential_zero():
 
 @given(st.lists(st.floats(-3, 3), min_size=2, max_size=50), st.floats(0.5, 0.999))
 def test_shaping_of_an_episode_telescopes_to_the_first_states_potential(robustness, g):
-    """The policy cannot change Σ γ^t F = -φ(s_0), so the optimal policy stays the same."""
+    """The policy cannot change Σ γ^t F = -φ(s_0); its optimum stays."""
     last = len(robustness) - 2
     total = sum(
         g**t * reward.shaped_reward(0.0, robustness[t], robustness[t + 1], g, float(t == last)) for t in range(last + 1)

@@ -1,4 +1,4 @@
-"""Literals are worked out by hand from the formulas of Shalev-Shwartz et al. 2017, Definitions 1, 2 and 6."""
+"""Literals by hand from Shalev-Shwartz et al. 2017, Definitions 1, 2, 6."""
 
 import math
 
@@ -85,7 +85,7 @@ def test_lateral_distance(ego_mps, other_mps, distance_m):
 
 
 def lateral_approach(ego_mps: float, other_mps: float, p: RssParameters) -> float:
-    """Def. 6 in its words: ρ of lateral acceleration towards each other, then braking to lateral standstill; m."""
+    """Def. 6 by simulation, m: acceleration towards each other, then lateral braking."""
     dt, approach = 1e-4, 0.0
     for speed_mps in (ego_mps, other_mps):
         for _ in range(round(p.response_s / dt)):
@@ -108,7 +108,7 @@ def test_the_lateral_distance_is_what_def_6_says_in_words_for_who_moves_away_too
 
 
 def view_of(ego_mps: float, *others: tuple[float, float, float, float, float]) -> RelativeView:
-    """The ego at the origin, driving along x; each other is x, y, heading, vx, vy."""
+    """Ego at the origin along x; others: x, y, heading, vx, vy."""
     columns = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), *others]).T
     x, y, heading, vx, vy = columns
     frame = frame_of(x_m=x, y_m=y, heading_rad=heading, vx_mps=vx, vy_mps=vy, length_m=4.0, width_m=2.0)
@@ -186,7 +186,7 @@ def test_undisturbed_traffic_is_not_dangerous(ego_mps, other, side):
 
 @pytest.mark.parametrize("braking_mps2", [6.0, 8.0, 9.0])
 def test_an_ego_that_brakes_too_late_wins_no_margin_back(braking_mps2):
-    """It would in metres: braking harder than b_min shortens the distance by more than the room it costs."""
+    """In metres it would: hard braking shortens the distance more than room."""
     contact_mps = 4.0
     falling = []
     for speed_mps in np.arange(12.0, contact_mps, -0.25):

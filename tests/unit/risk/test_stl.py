@@ -43,7 +43,7 @@ def at_rest() -> dict[str, float]:
 
 
 def oracle(formula: Any, traces: Traces) -> np.ndarray:
-    """Robustness, traces x steps. A formula is a signal's name, a number, or (operator, operands...)."""
+    """Computes robustness, traces x steps, of a signal, number, or (operator, operands...)."""
     shape = next(iter(traces.values())).shape
     if isinstance(formula, str):
         return traces[formula]
@@ -158,7 +158,7 @@ SHIPPED_FORMULAS: dict[str, Any] = {
 
 
 def random_traces(count: int, steps: int, seed: int) -> Traces:
-    """Random walks that wander through each signal's range and stick to its bounds."""
+    """Random walks through each signal's range that stick to its bounds."""
     rng = np.random.default_rng(seed)
     traces = {}
     for name, info in SIGNALS.items():

@@ -101,7 +101,7 @@ def two(path):
 
 
 def damages(content, cases):
-    """So many contents with a flipped bit or a lost end, from the first byte to the last."""
+    """Returns `cases` contents with a flipped bit or a lost end."""
     random = np.random.default_rng(1)
     flips = [flipped(content, position) for position in random.integers(len(content) * 8, size=cases // 2)]
     return flips + [content[:length] for length in random.integers(len(content), size=cases - len(flips))]

@@ -78,7 +78,7 @@ def test_a_crash_counts_once_and_its_traceback_goes_to_the_log(tmp_path, caplog)
 
 @pytest.fixture
 def crashed(tmp_path):
-    """The folder of a run that knows of one crash, and whose last process has crashed too."""
+    """Folder of a run with one counted crash and an uncounted one."""
     play(tmp_path)
     play(tmp_path)
     assert (tmp_path / COUNTS).exists()

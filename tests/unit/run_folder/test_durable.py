@@ -1,4 +1,4 @@
-"""A field of a record is declared once: store, answer and client have it without another edit."""
+"""Sealed files, damaged results, and records as they are stored and answered."""
 
 import json
 import math

@@ -21,7 +21,7 @@ def test_a_damaged_series_is_named(damage, tmp_path: Path) -> None:
 
 
 def without_letters(count: int) -> bytes:
-    """An .npz of a text of no letters, so many times, which takes no byte of the file."""
+    """Packs `count` texts of no letters, which take no bytes of file."""
     array, file = io.BytesIO(), io.BytesIO()
     header = {"descr": "<U0", "fortran_order": False, "shape": (count,)}
     np.lib.format.write_array_header_1_0(array, header)

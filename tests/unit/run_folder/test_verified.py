@@ -14,7 +14,7 @@ def failure(index: int, phase: str = "search", driven_by: DrivenBy | None = None
 
 
 def verified(**same: int) -> Verified:
-    """Of replays, two of each; by the index of an episode, how many were the same."""
+    """Verified results: by episode, how many of two replays were the same."""
     episodes = {int(index[1:]): Repetition(times=2, same=count) for index, count in same.items()}
     return Verified(digest="d", code="c", versions={}, episodes=episodes)
 

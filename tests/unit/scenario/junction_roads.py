@@ -1,6 +1,6 @@
-"""A junction of three roads in OpenDRIVE: road A along x, B beyond it in the other direction, C to its left.
+"""OpenDRIVE junction: road A along x, B beyond, C to its left.
 
-Road D lies apart, so that netconvert shifts the coordinates.
+B runs in the other direction. Road D lies apart, so that netconvert shifts the coordinates.
 """
 
 import math
@@ -84,7 +84,7 @@ MAP = file_xml(
 
 @cache
 def net_file() -> Path:
-    """The net that the road file is converted to; `junction.xodr` lies beside it."""
+    """Returns the net converted from the road file `junction.xodr` beside it."""
     folder = Path(mkdtemp())
     file = folder / "junction.xodr"
     file.write_text(MAP)

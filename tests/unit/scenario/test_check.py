@@ -1,4 +1,4 @@
-"""Every fault of a scenario document is one line with its path, what is there, what is wanted, and a remedy."""
+"""A document's fault is one line: path, value, expectation and remedy."""
 
 from pathlib import Path
 from typing import Any

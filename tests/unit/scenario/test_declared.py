@@ -1,4 +1,4 @@
-"""Declared distributions of scenes: samples by scipy's estimators, and the way back from a scene to its shares."""
+"""Declared distributions of scenes, by scipy's estimators, and shares of scenes."""
 
 import re
 

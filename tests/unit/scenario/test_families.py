@@ -81,7 +81,7 @@ def test_vehicles_on_one_lane_start_and_are_released_apart(family):
 
 
 def dense_with(**changes: float) -> dict[str, float]:
-    """How far before the stop line each vehicle of a dense scene starts."""
+    """Returns the distance of each dense vehicle's start to the stop line."""
     family = FAMILIES["dense"]
     middle = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
     layout = family.layout(dict(middle) | changes)

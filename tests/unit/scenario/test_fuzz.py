@@ -1,4 +1,4 @@
-"""Mutated documents and distributions are accepted, or refused in one line: no traceback, no hang."""
+"""Mutated documents and distributions are accepted, or refused in one line."""
 
 import copy
 import json
@@ -58,7 +58,7 @@ def _drop(fields: dict[str, Any], draw: random.Random) -> None:
 
 
 def _transplant(fields: dict[str, Any], draw: random.Random) -> None:
-    """Puts a value of any shipped document in place of another; never below itself."""
+    """Replaces a value by a copy of one of any shipped document."""
     donor, key = draw.choice(list(_places(draw.choice(DOCUMENTS))))
     container, own = draw.choice(list(_places(fields)))
     container[own] = copy.deepcopy(donor[key])
@@ -99,7 +99,7 @@ MUTATIONS: tuple[Callable[[dict[str, Any], random.Random], None], ...] = (
 
 
 def mutant(draw: random.Random) -> str:
-    """Returns a shipped document, changed at up to three places of its tree, or in its text."""
+    """Returns a shipped document with up to three changes, or changed text."""
     fields = copy.deepcopy(draw.choice(DOCUMENTS))
     if draw.random() < 0.15:
         text = yaml.safe_dump(fields, allow_unicode=True)
@@ -113,7 +113,7 @@ def mutant(draw: random.Random) -> str:
 
 
 def refused(text: str) -> ConfigError | None:
-    """Reads and checks a document and draws ten scenes of it, as an upload is; returns the refusal."""
+    """Reads and checks a document, draws ten scenes; returns the refusal."""
     try:
         document = document_from(text)
         nets = nets_of(document)

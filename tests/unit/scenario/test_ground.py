@@ -82,7 +82,7 @@ def test_a_junction_belongs_to_all_directions_but_its_walkways_do_not(sector):
 
 
 def test_from_a_junction_a_road_leads_on_only_in_its_direction():
-    """Along the road to the east, whose lanes away from the junction are the southern ones."""
+    """East of the junction, lanes that lead away are the southern ones."""
     dense = shipped("dense")
     for x_m in (17.0, 19.6, 22.0, 40.0):
         assert depth_at(dense, x_m, -4.8, EAST) > 1.6
@@ -93,7 +93,7 @@ def test_from_a_junction_a_road_leads_on_only_in_its_direction():
 
 @pytest.mark.parametrize("name", ["mixed", "dense"])
 def test_no_seam_between_lanes_junctions_and_squares(name):
-    """A metre more to the side is a metre less deep, wherever a lane is driven."""
+    """A metre to the side costs a metre of depth anywhere."""
     carriageway = shipped(name)
     for x_m in np.arange(-60.0, 60.0, 0.37):
         x_m, y_m = (x_m + 300.0, -4.95) if name == "mixed" else (x_m, -6.45)
@@ -101,7 +101,7 @@ def test_no_seam_between_lanes_junctions_and_squares(name):
 
 
 def bend(radius_m: float, width_m: float = 3.2) -> Carriageway:
-    """A lane that turns left by 90° about the origin, from the east, and one that comes back outside of it."""
+    """Lane that turns left by 90°, and one back outside of it."""
     angles = np.linspace(0.0, math.pi / 2, 60)
     roads = []
     for name, r, order in (("on", radius_m, 1), ("back", radius_m + width_m, -1)):

@@ -1,4 +1,4 @@
-"""Positions, routes and trajectories on a junction whose coordinates are computed by hand."""
+"""Positions, routes and trajectories on a junction, against coordinates by hand."""
 
 import math
 from collections.abc import Callable
@@ -81,7 +81,7 @@ def places() -> StoryPlaces:
 
 @pytest.fixture
 def at(places: StoryPlaces) -> Callable[..., tuple[float, float, float]]:
-    """Poses in the road file's coordinates, of positions relative to an actor there."""
+    """Resolves positions, relative to an actor, in the road file's coordinates."""
     assert roads_and_net()[1].shift_m == (300.0, 200.0)
     shift_x, shift_y = roads_and_net()[1].shift_m
 

@@ -1,4 +1,4 @@
-"""An adversary that is too far away, or drives elsewhere, cannot reach the ego."""
+"""Adversaries too far away, or driving elsewhere, cannot reach the ego."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every shipped document is short, described, and poses scenes that can be played."""
+"""Every shipped document is short, described, and poses playable scenes."""
 
 from importlib.resources import files
 from pathlib import Path

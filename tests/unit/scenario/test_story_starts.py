@@ -1,4 +1,4 @@
-"""Starts that a document states by its road file, and the ego's way from its story."""
+"""Starts by a document's road file, and the ego's way by story."""
 
 import math
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ def on_lane(road: str, lane: int, s_m: float, **more: Any) -> dict[str, Any]:
 
 
 def layout_of(actors: Mapping[str, Any] = {}, *, ego: Any = None, speed: float = 10.0, **story: Any) -> Layout:
-    """The layout of a document on the junction; the ego starts on road A."""
+    """Layout of a document on the junction; the ego starts on A."""
     document = Scenario.model_validate(
         {
             "name": "starts",

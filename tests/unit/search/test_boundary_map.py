@@ -1,4 +1,4 @@
-"""Maps over three and four parameters, and with the others drawn, of boundaries that are known."""
+"""Maps of known boundaries over three and four parameters, others drawn too."""
 
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ POINTS = 120
 
 
 def mapped(over, fails, others="fixed"):
-    """The map of episodes that fail where a rule of all unit coordinates, by name, says so."""
+    """Maps episodes that fail where `fails`, over unit coordinates by name, says."""
     config = BoundaryConfig(over=over, others=others)
     spec = RunSpec(family=FAMILY, method="boundary", seed=0, boundary=config)
     problem = Problem.from_spec(spec)

@@ -1,4 +1,4 @@
-"""The classifier of passing and failing, and the search for its boundary, on boundaries that are known."""
+"""Classifier of passing and failing, and boundary search, on known boundaries."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def test_points_that_are_out_leave_less_ambiguity_around_them_and_none_added():
 
 
 def test_an_outcome_that_is_awaited_tells_as_much_as_one_that_came():
-    """Of the deviation: by the formula for two points, with the variance that an outcome has as an observation."""
+    """The deviation follows the two-point formula with an outcome's variance."""
     points = sobol_points(2, 1, count=40).numpy()
     classifier, pair = FailureClassifier(points, plane(points)), np.array([[0.4, 0.5], [0.5, 0.5]])
     draws = classifier.samples(pair, 200_000, seed=0)

@@ -1,4 +1,4 @@
-"""Two frames around a contact that lies where it is put, for the tests of the oracle and of the rules."""
+"""Two frames around a contact at a given place, for tests."""
 
 import math
 
@@ -16,7 +16,7 @@ Actor = tuple[float, float, float, float, float, Kind]  # x, y, heading, vx, vy 
 def frames(
     *actors: Actor, step_s: float = STEP_S, time_s: float = 5.0, share: float = 0.5, ids: tuple[str, ...] | None = None
 ) -> tuple[Frame, Frame]:
-    """Two frames around an instant at which the actors stand as given: `share` of the step lies before it.
+    """Two frames around a given instant; `share` of the step precedes it.
 
     The first actor is the ego; everybody keeps velocity and heading.
     """

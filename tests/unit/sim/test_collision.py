@@ -78,7 +78,7 @@ def test_of_two_contacts_in_a_step_the_earlier_one_is_reported():
 
 
 def crossing(turned_rad: float = 0.0) -> tuple[Frame, Frame]:
-    """Two cars at 14 m/s cross at right angles and overlap for 87 ms between the frames; the other one also turns."""
+    """Two cars at 14 m/s cross at right angles for 87 ms."""
     x, y = 3.2557315650303864, -1.9705839164298644
     before, frame = frames(ego(14.0), (x, y, -math.pi / 2, 0.0, -14.0, CAR), share=0.0, time_s=10.0)
     return before, moved(frame, heading_rad=frame.heading_rad + np.array([0.0, turned_rad]))
@@ -103,7 +103,7 @@ def test_bodies_that_part_within_the_step_have_touched(side, turned_rad):
 
 
 def test_sweeping_the_bodies_agrees_with_shapely_on_random_steps():
-    """Cars, long vehicles and pedestrians, which move by up to 3 m and turn by up to 30 degrees."""
+    """Cars, long vehicles and pedestrians; moves ≤ 3 m, turns ≤ 30°."""
     generator, shares = np.random.default_rng(5), np.linspace(0.0, 1.0, 101)
     found = parted = 0
     for _ in range(300):

@@ -1,4 +1,4 @@
-"""Kinematic limits as properties of the commands; what SUMO then drives is tests/integration/test_adversaries.py."""
+"""Kinematic limits of commands; tests/integration/test_adversaries.py has what SUMO drives."""
 
 import math
 from dataclasses import replace
@@ -42,7 +42,7 @@ Actions = list[tuple[float, float]]
 
 
 def sequence(seed: int) -> Actions:
-    """12 s: uniform, bang-bang, flat out, or drawn to a bias, as a policy that has learned to do one thing."""
+    """Actions of 12 s: uniform, bang-bang, flat out, or biased."""
     random = Random(seed)
     kind = random.choice(("uniform", "bang-bang", "flat out", "biased"))
     bias = random.uniform(-1, 1), random.uniform(-1, 1)
@@ -77,7 +77,7 @@ def drive(
     start_m: float = 0.0,
     ends_m: float = math.inf,
 ) -> tuple[VehicleControl, list[VehicleCommand], list[float], list[float]]:
-    """The commands, with the start in front, and station and offset when each was given; a road of 2·half_m."""
+    """Drives a road of 2·half_m; returns control, commands, stations and offsets."""
     control = VehicleControl(limits, start_mps)
     commands, stations, offsets = [VehicleCommand(start_mps, 0.0)], [start_m], [0.0]
     for action in actions:

@@ -37,7 +37,7 @@ def hidden(belief: Belief) -> set[str]:
 
 
 def expected(perception: Perception, belief: Belief) -> dict[str, list[float]]:
-    """Position, heading and velocity of actors that it knows of but did not see."""
+    """Position, heading and velocity of actors known but not seen."""
     columns = zip(IDS[1:], belief.known[1:], perception.seen, belief.state.T[1:], strict=True)
     return {id_: column[list(MOTION)].tolist() for id_, known, sees, column in columns if known and not sees}
 

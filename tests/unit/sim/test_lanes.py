@@ -1,4 +1,4 @@
-"""The road that an ego is told, on every net: against geometry, and turned."""
+"""The road that an ego perceives, on every net, against geometry."""
 
 import math
 from contextlib import closing

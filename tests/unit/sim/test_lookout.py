@@ -1,4 +1,4 @@
-"""Actors that a driver stops for or follows, by hand, on a straight road along x."""
+"""Actors that a driver stops for or follows, on a straight road."""
 
 import math
 from typing import NamedTuple
@@ -82,7 +82,7 @@ def test_a_driver_that_has_stopped_waits_until_the_pedestrian_has_left_its_corri
 @sides
 @pytest.mark.parametrize("step_m", [0.0, 0.01, -0.01, 0.35, -0.35])
 def test_who_walks_in_where_one_lane_leads_to_another_is_seen_from_either_side(step_m, side):
-    """The second lane begins a little beside the first: a path across the road, for an actor near it."""
+    """The second lane begins beside the first: locally a path across it."""
     before, behind = [(0.0, 0.0), (50.0, 0.0)], [(50.0, step_m), (300.0, step_m)]
     path = path_along([np.array(before), np.array(behind)], [13.9, 13.9])
     for x in np.arange(48.0, 52.0, 0.25):
@@ -94,7 +94,7 @@ def test_who_walks_in_where_one_lane_leads_to_another_is_seen_from_either_side(s
 
 @sides
 def test_who_walks_in_between_the_way_there_and_the_way_back_is_seen(side):
-    """Round a roundabout and back, 3.5 m beside: all actors there are nearer to the way back."""
+    """Round a roundabout and back: all actors are nearer the way back."""
     angles = np.linspace(-0.5, 0.5, 21)[1:-1] * 1.9 * math.pi
     there, back = [(0.0, 0.0), (60.0, 0.0)], [(60.0, side * 3.5), (0.0, side * 3.5)]
     ring = [(75.0 + 14.0 * -math.cos(a), side * (1.75 + 14.0 * math.sin(a))) for a in angles]

@@ -80,7 +80,7 @@ def test_a_vehicle_drives_along_its_path(sim, family, route, lane, position_m):
 
 
 def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim, tmp_path):
-    """As the outer lanes of a bend are, since an edge has one length."""
+    """Outer lanes of a bend are so: an edge has one length."""
     shipped = (Path(sumo_nets.__file__).parent / "low" / "low.net.xml").read_text()
     net = tmp_path / "short.net.xml"
     net.write_text(shipped.replace('length="1200.00"', 'length="1190.00"'))
@@ -100,7 +100,7 @@ LINK = '<connection from="{}" to="{}" fromLane="{}" toLane="{}"/>'
 
 @pytest.mark.parametrize("own", [0, 1])
 def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(sim, tmp_path, own):
-    """The other one leads off the route, to the right or to the left."""
+    """The other lane leads off the route, to the right or left."""
     links = [("a", "b", 0, 0), ("a", "b", 0, 1), ("b", "c", own, 0), ("b", "d", 1 - own, 0)]
     parts = {
         "nodes": NODES + f'<node id="4" x="300" y="{-80 if own else 80}"/>',

@@ -39,7 +39,7 @@ def moved(pose: Pose, time_s: float) -> Pose:
 def driven(
     action: tuple[float, float], others: list[Pose], *, speed: float = 10.0, ego: Pose = EGO, keeps_clear: bool = True
 ) -> list[Pose]:
-    """6 s of a vehicle that starts along x with its front at 0 and is told the same all the time."""
+    """6 s of a vehicle from 0 along x under constant action."""
     control, path, wide = VehicleControl(LIMITS, speed), road(), LateralRoom(50.0, 50.0)
     station, offset, poses = 0.0, 0.0, [(-HALF_M, 0.0, 0.0, speed)]
     for step in range(60):
@@ -99,7 +99,7 @@ def test_a_vehicle_lets_another_cross(side):
 
 
 def leaves_late(side: int, at_m: float, *, statics: int = 1, beside: Pose | None = None) -> list[Pose]:
-    """Steers to a side from `at_m` before a body that stands; at 15 m/s, beside another vehicle if one is given."""
+    """Steers aside `at_m` before a standing body, at 15 m/s."""
     control, path, wide = VehicleControl(LIMITS, 15.0), road(), LateralRoom(50.0, 50.0)
     station, offset, poses = 0.0, 0.0, [(-HALF_M, 0.0, 0.0, 15.0)]
     standing = (100.0, 0.0, 0.0, 0.0)
@@ -140,7 +140,7 @@ def test_a_vehicle_stops_before_a_static_body_that_it_cannot_go_round(side):
 
 
 def walked(turn: float, parked: Pose) -> list[Walker]:
-    """6 s of a pedestrian that starts at the origin along x and is told to run all the time."""
+    """6 s of a pedestrian running from the origin along x."""
     control = PedestrianControl(LIMITS, Walker(0.0, 0.0, 0.0, 1.5))
     walkers = [control.state]
     for _ in range(60):

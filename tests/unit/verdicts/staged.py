@@ -1,4 +1,4 @@
-"""Episodes staged by hand: everybody's motion is a function of time, and the record ends with the first contact."""
+"""Episodes staged by motions over time, up to the first contact."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ Motion = Callable[[float], tuple[float, float, float]]  # time from the release 
 def straight(
     x: float, y: float, heading: float, speed: float, *changes: tuple[float, float], start_s: float = -1.5
 ) -> Motion:
-    """Along a line, at (x, y) at `start_s`; each change is (from when, acceleration), and speed never falls below 0."""
+    """Line from (x, y) at `start_s`; changes: (from when, acceleration)."""
     pieces = [(start_s, 0.0, speed, 0.0)]  # from when, metres gone, speed, acceleration
     for since, accel in changes:
         pieces.append((since, *_gone(pieces[-1], since), accel))
@@ -55,7 +55,7 @@ def _gone(piece: tuple[float, float, float, float], t: float) -> tuple[float, fl
 
 
 def sideways(motion: Motion, start_s: float, rate_mps: float, until_m: float) -> Motion:
-    """`motion` with a move across from `start_s` on, positive to the left, by `until_m` at most."""
+    """Adds a lateral move from `start_s`, left positive, by at most `until_m`."""
 
     def at(t: float) -> tuple[float, float, float]:
         x, y, heading = motion(t)
@@ -81,7 +81,7 @@ def stage(
     offsets: bool = True,
     contact: bool = True,
 ) -> Evidence:
-    """The record of an episode with these motions, the ego's first, until the ego's first contact, or to its end."""
+    """Records an episode of motions, the ego's first, until contact or end."""
     times = np.arange(round(from_s / STEP_S), round(until_s / STEP_S) + 1) * STEP_S
     poses = np.array([[motion(t) for motion in motions] for t in times])  # T x n x 3
     before = np.array([[motion(t - STEP_S) for motion in motions] for t in times])
@@ -126,7 +126,7 @@ def _first_contact(poses: Floats, sizes: Floats) -> int:
 
 
 def mirrored(evidence: Evidence) -> Evidence:
-    """The same seen in a mirror along the x axis: left is right."""
+    """Mirrors the evidence along the x axis: left becomes right."""
     areas = {
         name: tuple(Area(tuple((nx, -ny, c) for nx, ny, c in a.sides)) for a in getattr(evidence.ground, name))
         for name in ("crossings", "junctions", "roadway")
@@ -143,7 +143,7 @@ def mirrored(evidence: Evidence) -> Evidence:
 
 
 def judged(evidence: Evidence) -> Judgement:
-    """Judges a valid contact with `actor_1`; in the mirror the verdict has to be the same."""
+    """Judges a contact with `actor_1`; its mirror image must agree."""
     first, second = (judge(each, "actor_1", valid=True) for each in (evidence, mirrored(evidence)))
     sides = {"conflict_y_m": first.conflict_y_m, "kind": first.kind}
     assert second.model_copy(update=sides) == first
@@ -154,7 +154,7 @@ def judged(evidence: Evidence) -> Judgement:
 def pedestrian_crosses(
     speed: float = 12.0, walk: float = 1.4, seen_from_s: float = -math.inf, side: int = 1
 ) -> Evidence:
-    """From the kerb (y = ±6.6) over the crossing at x = 100, so that the ego's middle meets it."""
+    """A pedestrian crosses from the kerb; the ego's middle meets it."""
     reach_s = (100.0 - CAR_M[0] / 2) / speed
     ego = straight(0.0, 0.0, 0.0, speed, start_s=0.0)
     walker = straight(100.0, side * walk * reach_s, -side * math.pi / 2, walk, start_s=0.0)
@@ -164,7 +164,7 @@ def pedestrian_crosses(
 def cut_in(
     gap: float = 12.0, ego: float = 14.0, other: float = 9.0, rate: float = 1.2, at_s: float = 2.0, side: int = 1
 ) -> Evidence:
-    """From the lane beside, `gap` metres ahead of the ego's front when it begins."""
+    """A vehicle from the lane beside cuts in `gap` metres ahead."""
     ego_motion = straight(0.0, 0.0, 0.0, ego)
     start = ego * (at_s + 1.5) + CAR_M[0] + gap - other * (at_s + 1.5)
     beside = straight(start, side * LANE_M, 0.0, other)
@@ -172,13 +172,13 @@ def cut_in(
 
 
 def hangs_over(at_s: float, comes_at_s: float) -> Evidence:
-    """Beside the ego and as fast, it moves half a metre over, stays there for a while, and then comes."""
+    """A neighbour hangs over by half a metre, and later comes over."""
     beside = sideways(straight(-1.5 * 12.0 + CAR_M[0] - 3.0, LANE_M, 0.0, 12.0), at_s, -1.2, 0.5)
     return stage(straight(-1.5 * 12.0, 0.0, 0.0, 12.0), sideways(beside, comes_at_s, -1.2, LANE_M - 0.5))
 
 
 def merge(rate: float = 1.2, at_s: float = 2.0, side: int = 1, other_x: float = -2.0, speed: float = 12.0) -> Evidence:
-    """The ego moves over to a neighbour that keeps its lane, and its speed, `other_x` metres ahead of the ego."""
+    """The ego moves over to a neighbour that keeps lane and speed."""
     ego = sideways(straight(0.0, 0.0, 0.0, speed), at_s, side * rate, LANE_M)
     return stage(ego, straight(other_x, side * LANE_M, 0.0, speed))
 
@@ -189,7 +189,7 @@ def leader_brakes(gap: float = 20.0, speed: float = 14.0, braking: float = 8.0, 
 
 
 def crossing_car(ego: float = 12.0, other: float = 12.0, side: int = -1, ahead: float = 0.0) -> Evidence:
-    """From the right (side -1) or the left through x = 60, the ego's front first or later by `ahead` metres."""
+    """Crossing car from the right (side -1) or left, `ahead` metres later."""
     t = 60.0 / ego
     return stage(
         straight(0.0, 0.0, 0.0, ego, start_s=0.0),

@@ -26,7 +26,7 @@ def test_a_clean_contact_passes():
 
 
 def beside(x_m: float, until_s: float) -> Evidence:
-    """The ego runs into a leader; a third car drives until then through a fourth, in the lane beside, and is gone."""
+    """Ego runs into its leader; beside, one car drives through another `until_s`."""
     first, second = straight(x_m, 3.3, 0.0, 14.0), straight(x_m + 3.0, 3.3, 0.0, 14.0)
     parts = sideways(second, until_s, 40.0, 4.0)  # out of the way within a step
     kinds = (*CARS, CAR)
@@ -80,7 +80,7 @@ def on(friction: float, evidence: Evidence) -> bool:
 
 
 def driving(path: object, until_s: float = 4.0) -> Evidence:
-    """A striker with this motion; the ego stands beside the way, and the contact does not matter here."""
+    """Striker with this motion; ego and contact do not matter."""
     evidence = stage(straight(0.0, 0.0, 0.0, 0.0), straight(3.0, 0.0, 0.0, 0.0))
     times = np.arange(0, until_s, 0.1)
     poses = np.array([path(t) for t in times])

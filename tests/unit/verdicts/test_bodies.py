@@ -1,4 +1,4 @@
-"""A contact with each body of the table: its harm, its severity and its name."""
+"""Contact with each body of the table: harm, severity and name."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Competent drivers in place of an ego that keeps its speed, against R157's driver written out by hand."""
+"""Competent drivers in the ego's place, against a hand-written R157 driver."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ BOTH = {"r157": True, "fsm": True}
 
 
 def cut_in(gap_m: float, across_mps: float, other_mps: float, ego: Motion, ego_mps: float) -> Evidence:
-    """A vehicle comes over from the left, `gap_m` ahead of an ego that keeps its speed until then."""
+    """A vehicle comes over from the left, `gap_m` ahead of the ego."""
     start = ego_mps * BEGINS_S + CAR_M[0] + gap_m - other_mps * BEGINS_S
     beside = straight(start, LANE_M, 0.0, other_mps, start_s=0.0)
     return stage(ego, sideways(beside, BEGINS_S, -across_mps, LANE_M), from_s=0.0, until_s=12.0, contact=False)
@@ -25,7 +25,10 @@ def steady(ego_mps: float) -> Motion:
 
 
 def regulation_avoids(gap_m: float, across_mps: float, other_mps: float, ego_mps: float) -> bool:
-    """R157's driver in a cut-in at constant speeds: 0.375 m, 0.4 s, 0.75 s, then 12.65 m/s³ up to 0.774 g."""
+    """R157's driver in a cut-in at constant speeds, by simulation.
+
+    0.375 m, 0.4 s, 0.75 s, then 12.65 m/s³ up to 0.774 g.
+    """
     step_s, speed, gap, t = 0.001, ego_mps, gap_m, 0.0
     acts_s, overlaps_s = 0.375 / across_mps + 0.4, (LANE_M - CAR_M[1]) / across_mps
     while t < 12.0 and gap > -2 * CAR_M[0]:
@@ -42,7 +45,7 @@ def regulation_avoids(gap_m: float, across_mps: float, other_mps: float, ego_mps
 @pytest.mark.parametrize("across_mps", [0.8, 1.2, 1.6])
 @pytest.mark.parametrize(("ego_mps", "other_mps"), [(16.7, 5.6), (16.7, 11.1), (25.0, 15.0)])
 def test_the_boundary_of_cut_ins_is_the_regulations(across_mps, ego_mps, other_mps):
-    """The largest gap that is not preventable, to 1 m; the record has a frame every 0.1 s."""
+    """The largest unpreventable gap agrees to 1 m; frames every 0.1 s."""
     gaps = np.arange(1.0, 60.0)
 
     def last_unpreventable(avoids: list[bool]) -> float:
@@ -62,7 +65,7 @@ def test_the_mirror_image_has_the_same_verdict(gap_m):
 
 @pytest.mark.parametrize("gap_m", [3.0, 8.0, 25.0])
 def test_what_the_ego_did_makes_no_difference(gap_m):
-    """It goes on, or brakes once the vehicle comes over; or it was slower, and the vehicle waited for its gap."""
+    """The ego goes on, brakes at the cut-in, or was slower before."""
     brakes = straight(0, 0, 0, 16.7, (BEGINS_S + 0.5, -7.0), start_s=0.0)
     slower = straight(0, 0, 0, 16.7, (0.2, -4.0), (0.7, 0.0), start_s=0.0)
     behind_m = 16.7 * BEGINS_S - slower(BEGINS_S)[0]
@@ -89,7 +92,7 @@ def test_a_vehicle_in_plain_view_far_ahead_is_no_danger_and_one_that_comes_into_
 
 
 def test_a_leader_that_brakes_hard_is_avoided_from_a_proper_distance_alone():
-    """At 2 s of headway as the regulation has it, and not at 0.4 s."""
+    """Avoided at the regulation's 2 s of headway, not at 0.4 s."""
 
     def braking(gap_m: float) -> Evidence:
         leader = straight(CAR_M[0] + gap_m, 0, 0, 16.7, (2.0, -9.0), start_s=0.0)

@@ -1,4 +1,4 @@
-"""Each type's beginning against times worked out by hand; all of it again in the mirror."""
+"""Beginning of each conflict type against times by hand, and mirrored."""
 
 import math
 from dataclasses import replace
@@ -53,7 +53,7 @@ def test_who_drifts_over_alongside_is_in_conflict_whatever_its_speed(found):
 
 
 def test_a_vehicle_that_keeps_its_lane_does_not_cut_in_on_an_ego_that_swerves_out_behind_it(found):
-    """The ego is 1.7 m aside, more than half a lane, and touches the rear corner."""
+    """The ego is 1.7 m aside and touches the rear corner."""
     swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 0.5, 0.8, 1.7)
     conflict = found(stage(swerves, straight(60.0, 0.0, 0.0, 5.0)))
     assert (conflict.type, conflict.came_over) == (ConflictType.LEADER, False)
@@ -92,7 +92,7 @@ def test_a_pedestrian_that_would_just_clear_the_way_counts_before_it_stops_in_it
 def test_a_neighbour_is_in_conflict_once_it_is_over_the_line_and_not_while_it_keeps_its_lane(
     found, off_m, rate, before_s
 ):
-    """Level with the ego and as fast; the marking is 0.725 m from its side."""
+    """It is level and as fast; the marking is 0.725 m off."""
     beside = sideways(straight(0.0, LANE_M, 0.0, 12.0), 0.5, -2.0, off_m)
     evidence = stage(straight(0.0, 0.0, 0.0, 12.0), sideways(beside, 3.0, -1.0, LANE_M - off_m))
     assert evidence.time_s[-1] - found(evidence).time_s == pytest.approx(before_s, abs=1.0)

@@ -1,4 +1,4 @@
-"""The defensive driver by its four rules: in one moment, and in the ego's place."""
+"""Defensive driver by its four rules: momentarily, and in the ego's place."""
 
 import math
 from dataclasses import replace
@@ -35,7 +35,7 @@ NO_FASTER = 1e-3  # m/s²: braking that only keeps the ego from speeding up is l
 
 
 def braking(*others: Actor, ego: float = 12.0, side: int = 1, after_s: float = 0.0, **changes: object) -> float:
-    """How hard the driver brakes on the lane along y = 0 before the crossing at 98 m, `after_s` it saw them."""
+    """Braking before the crossing at 98 m, `after_s` it saw the others."""
     x, y, heading, speed, kinds = zip((60.0, 0.0, 0.0, ego, CAR), *others, strict=True)
     frame = frame_of(
         kinds, x_m=x, y_m=side * np.array(y), heading_rad=side * np.array(heading), speed_mps=speed, **changes
@@ -141,7 +141,7 @@ def prevents(evidence: Evidence, name: str = "defensive") -> bool:
 
 
 def from_behind_a_standing_car(walks: float = 1.6, crossing: bool = True) -> Evidence:
-    """At 14 m/s the ego passes a car that stands before the crossing; a pedestrian comes from behind that."""
+    """A pedestrian comes from behind a car standing before the crossing."""
     reach_s = (100.0 - 2.3) / 14.0
     ego = straight(-1.5 * 14.0, 0.0, 0.0, 14.0)
     walker = straight(100.0, -walks * reach_s, math.pi / 2, walks, start_s=0.0)
@@ -152,7 +152,7 @@ def from_behind_a_standing_car(walks: float = 1.6, crossing: bool = True) -> Evi
 
 
 def speeds_up_past_a_pedestrian(side: int = 1) -> Evidence:
-    """It stands 0.6 m beside the ego's corridor, on the lane, and steps on when the ego is 0.9 s away."""
+    """A pedestrian beside the corridor steps on 0.9 s before the ego."""
     ego = straight(-1.5 * 7.0, 0.0, 0.0, 7.0, (0.0, 1.5))
     walker = waiting(40.0, -side * 2.15, side * math.pi / 2, 2.0, until_s=3.0)
     return stage(ego, walker, kinds=(CAR, WALKER))

@@ -1,4 +1,4 @@
-"""Distinct failures by kind, and what a search's finds are worth by kind and variant."""
+"""Distinct failures by kind, and worth of finds by kind and variant."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Literals by hand from the formulas; both surfaces are monotone in what makes a gap more dangerous."""
+"""Literals by hand; both surfaces are monotone in a gap's danger."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the ego did about its striker, as facts; also in the mirror."""
+"""The ego's reaction to its striker, as facts; also mirrored."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Whose fault a contact is: the rule line by line, and failures as an engineer and a court would judge them."""
+"""Fault for a contact: the rule by line, and an engineer's judgement."""
 
 import math
 from dataclasses import replace
@@ -106,7 +106,7 @@ def test_what_others_caused_is_a_headline_only_where_a_driver_that_reacts_preven
 
 
 def past_a_pedestrian(accel: float) -> Evidence:
-    """A pedestrian stands 0.3 m beside the ego's way and steps on 0.7 s before it; the ego speeds up from 1 s on."""
+    """Pedestrian 0.3 m aside steps on 0.7 s before the speeding-up ego."""
     ego = straight(0.0, 0.0, 0.0, 8.0, (1.0, accel), start_s=0.0)
     meets_s = next(t / 100 for t in range(1000) if ego(t / 100)[0] + CAR_M[0] / 2 >= 40.0)
     beside = straight(40.0, CAR_M[1] / 2 + 0.25 + 0.3, -math.pi / 2, 1.5, start_s=meets_s - 0.7)
@@ -121,7 +121,7 @@ def test_an_ego_that_speeds_up_past_a_pedestrian_it_sees_at_its_way():
 
 
 def starts_into(entered_s: float) -> Evidence:
-    """The ego stands at 50, a car comes from the right on red, waits at its way from 1 s on, and both start."""
+    """A car that entered on red waits before the ego; both start."""
     ego = straight(45.0, 0.0, 0.0, 0.0, (3.0, 2.3))
     car = straight(60.0, -20.5, math.pi / 2, 6.0, (0.0, -3.0), (4.0, 2.5))
     evidence = stage(ego, car, ground=replace(STREET, junctions=JUNCTION))
@@ -139,7 +139,7 @@ def test_an_ego_that_stands_and_starts_into_a_crossing_car_it_sees(red, expected
 
 @pytest.mark.parametrize(("letter", "expected"), [("", Fault.OTHER), ("g", Fault.EGO)], ids=["none", "had to yield"])
 def test_a_crossing_car_that_runs_into_the_egos_rear_half(letter, expected):
-    """The ego's middle is 1.7 m beyond the other's when the two touch."""
+    """The ego's middle is 1.7 m beyond the other's at the touch."""
     evidence = crossing_car(other=9.0, ahead=-6.0)
     link = np.zeros_like(evidence.link)
     link[evidence.time_s < 3.0, 0], link[evidence.time_s < 3.0, 1] = ord(letter) if letter else 0, ord("G")
@@ -153,7 +153,7 @@ def test_a_crossing_car_that_runs_into_the_egos_rear_half(letter, expected):
     ids=["it was there before the green", "it came later", "it came on red"],
 )
 def test_a_car_that_clears_the_junction_when_the_egos_signal_turns_green(green_s, enters_s, red, expected):
-    """It runs into the ego's rear half, so that the ego's late reaction does not count by itself."""
+    """It hits the ego's rear half: late reaction alone does not count."""
     evidence = crossing_car(other=9.0, ahead=-6.0)
     link, time_s = np.zeros_like(evidence.link), evidence.time_s
     link[time_s < 3.5, 0] = ord("G")
@@ -254,7 +254,7 @@ def test_a_brake_check_is_harder_than_drivers_of_ordinary_behaviour_brake(brakin
 
 
 def walks(x_m: float, y_m: float, turn_rad: float, at_s: float) -> Motion:
-    """Along the kerb towards the ego, and from `at_s` on to its right by `turn_rad`."""
+    """Walks along the kerb towards the ego; turns right at `at_s`."""
     along = straight(x_m, y_m, math.pi, 1.4)
     return lambda t: along(t) if t < at_s else straight(*along(at_s)[:2], math.pi + turn_rad, 1.4, start_s=at_s)(t)
 

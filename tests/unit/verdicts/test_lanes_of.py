@@ -1,4 +1,4 @@
-"""Limit and width of the lane that a body is in, on nets whose lanes differ."""
+"""Limit and width of a body's lane, on nets whose lanes differ."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ ROUNDABOUT = Ground(net="roundabout/roundabout.net.xml")
 
 
 def drives(x: float, y: float, heading: float, speed: float, ground: Ground) -> Evidence:
-    """Half a second of an ego at a place, and of a car far away."""
+    """Half a second of an ego at a place, others far away."""
     ego = straight(x, y, heading, speed, start_s=0.0)
     return stage(ego, straight(0.0, 500.0, 0.0, 10.0), ground=ground, from_s=0.0, until_s=0.5, contact=False)
 

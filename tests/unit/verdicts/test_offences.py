@@ -76,7 +76,10 @@ def test_what_crossing_traffic_passed_its_stop_line_on(link, expected):
 
 
 def dawdles(out_of_it: bool) -> Evidence:
-    """It passes its stop line on red at 1.2 s and creeps for 9 s; `out_of_it`: the junction ends 9 m before the ego."""
+    """The ego passes its stop line on red, then creeps 9 s.
+
+    `out_of_it`: the junction ends 9 m before the ego.
+    """
     creeping = straight(60.0, -20.0, math.pi / 2, 10.0, (1.0, -10.0), (1.92, 0.0), start_s=0.0)
     evidence = stage(straight(0.0, 0.0, 0.0, 5.6, start_s=0.0), creeping, from_s=0.0, until_s=20.0)
     evidence = with_links(evidence, GREEN, [(0.0, "r"), (1.2, "")])
@@ -93,7 +96,7 @@ def test_a_striker_on_red_stays_on_red_until_it_has_left_the_junction():
 
 @pytest.mark.parametrize(("release_x_m", "expected"), [(20.0, ()), (0.0, ("red_light",))])
 def test_a_red_light_before_which_the_ego_could_not_stop_at_the_release_is_no_offence(release_x_m, expected):
-    """Its line is at 45 m; at 12 m/s it takes 30 m to stop at leisure."""
+    """The line is at 45 m; stopping at leisure takes 30 m."""
     ego = straight(release_x_m, 0.0, 0.0, 12.0, start_s=0.0)
     evidence = stage(ego, straight(60.0, 0.0, 0.0, 2.0, start_s=0.0), from_s=0.0)
     passes_s = (45.0 - 2.3 - release_x_m) / 12.0
@@ -170,7 +173,7 @@ def test_a_pedestrian_that_walks_into_an_ego_on_the_crossing_has_lost_nothing():
 
 
 def on_two_way_road(moved_m: float, *others: Motion, until_s: float = 6.0) -> tuple[str, ...]:
-    """What an ego broke that moved across from its lane (y = -1.65) on a road whose left half is oncoming."""
+    """Offences of an ego that moves across a two-way road's lanes."""
     ego = sideways(straight(100.0, -1.65, 0.0, 12.0), 0.0, math.copysign(3.0, moved_m), moved_m)
     far = straight(280.0, -4.95, 0.0, 12.0)
     ground = Ground(net="mixed/mixed.net.xml")

@@ -1,4 +1,4 @@
-"""What is in conflict now: by hand, in the mirror, and as the record says that began there."""
+"""Conflict at a moment: by hand, mirrored, and as in the record."""
 
 import math
 from dataclasses import replace

@@ -32,7 +32,7 @@ def outcomes(evidence: Evidence) -> Mapping[str, ReferenceOutcome]:
 
 
 def standing_in_the_way(distance_m: float, speed: float = 15.0, friction: float = 1.0) -> Evidence:
-    """A pedestrian that comes into sight at time 0, standing `distance_m` ahead of the ego's front."""
+    """A pedestrian standing `distance_m` ahead comes into sight at time 0."""
     ego = straight(-1.5 * speed, 0.0, 0.0, speed)
     walker = straight(CAR_M[0] / 2 + distance_m + 0.25, 0.0, 0.0, 0.0)
     return stage(

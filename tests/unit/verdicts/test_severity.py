@@ -1,4 +1,4 @@
-"""Recorded contacts by name, judged as an ADS engineer judges them; see `tests.unit.verdicts.recorded`."""
+"""Severity, overlaps and recorded contacts, which an ADS engineer has judged."""
 
 import math
 from dataclasses import replace
@@ -62,12 +62,12 @@ def stands_in_the_way(speed: float) -> Evidence:
 
 
 def runs_into_a_rolling_car() -> Evidence:
-    """A pedestrian that runs at 4 m/s at the front of a car that rolls at 0.6 m/s."""
+    """A pedestrian at 4 m/s runs into a car at 0.6 m/s."""
     return stage(straight(0.0, 0.0, 0.0, 0.6), straight(20.0, 0.2, math.pi, 4.0), kinds=WALKING)
 
 
 def slides_along() -> Evidence:
-    """A car that is 8 m/s slower comes over into the ego's flank at 1 m/s."""
+    """A car 8 m/s slower comes over into the ego's flank."""
     return stage(straight(0.0, 0.0, 0.0, 14.0), sideways(straight(36.0, LANE_M, 0.0, 6.0), 1.5, -1.0, LANE_M))
 
 

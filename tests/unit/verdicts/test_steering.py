@@ -1,4 +1,4 @@
-"""Verdicts on an ego that is not in its first lane, changes lanes or leaves the road; each in the mirror too."""
+"""Verdicts on egos that change lanes or leave the road, also mirrored."""
 
 import math
 from dataclasses import replace
@@ -27,7 +27,7 @@ from tests.unit.verdicts.staged import (
 
 
 def shifted(evidence: Evidence, lanes: int) -> Evidence:
-    """The same encounter some lanes further left on a road that is wide enough."""
+    """Shifts an encounter some lanes left on a road wide enough."""
     by_m = lanes * LANE_M
     ground = evidence.ground
     wide = replace(ground, roadway=tuple(area.grown(by_m) for area in ground.roadway))
@@ -152,7 +152,7 @@ def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded, next_lane)
 
 
 def leaves_the_road(walker_y: float = -9.0) -> Evidence:
-    """The ego leaves the road (y = ±6.6) to the right, where a pedestrian stands."""
+    """The ego leaves the road to the right, where a pedestrian stands."""
     ego = sideways(straight(0.0, 0.0, 0.0, 10.0), 2.0, -3.0, 9.0)
     return stage(ego, straight(60.0, walker_y, math.pi / 2, 0.0), kinds=WALKING)
 

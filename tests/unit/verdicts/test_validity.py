@@ -69,7 +69,7 @@ BEHIND_MPS, EGO_MPS = 20.0, 12.0
 
 
 def from_behind(side: int, gap_m: float, over_m: float = LANE_M, comes_m: float = 0.0, at_s: float = 2.0) -> Evidence:
-    """The ego moves to `side` by `over_m`, the one behind towards it by `comes_m`; `gap_m` apart when they begin to."""
+    """The ego moves `over_m` to `side`, the car behind `comes_m` towards it."""
     since_s = at_s + 1.5
     ego_motion = sideways(straight(0.0, 0.0, 0.0, EGO_MPS), at_s, side * 2.0, over_m)
     rear_m = EGO_MPS * since_s - LENGTH_M - gap_m

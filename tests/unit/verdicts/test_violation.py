@@ -1,4 +1,4 @@
-"""Violations without contact: their records, and which reference driver keeps the requirement; also in the mirror."""
+"""Violations without contact: records and preventing reference drivers, also mirrored."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -61,7 +61,7 @@ def violated(
 
 
 def closes_in(gap_m: float = 25.0, late_s: float = 2.0, *others: Motion) -> Evidence:
-    """A leader brakes to a stand at 1 s; the ego brakes with 8 m/s², `late_s` after it."""
+    """A leader brakes at 1 s, the ego `late_s` after it."""
     ego = straight(0.0, 0.0, 0.0, 14.0, (1.0 + late_s, -8.0))
     leader = straight(CAR_M[0] + gap_m, 0.0, 0.0, 14.0, (1.0, -6.5))
     return staged(ego, leader, *others, kinds=(Kind.VEHICLE,) * (2 + len(others)))
@@ -98,7 +98,7 @@ def test_an_ego_that_passes_a_pedestrian_too_closely_would_have_had_room_in_its_
 
 
 def to_line(evidence: Evidence, line_m: float, yellow_m: float, red_m: float) -> list[tuple[Signal, float]]:
-    """A signal that turns yellow and red when the ego's front is so far from its line; none behind it."""
+    """Signal that turns yellow and red at distances from its line."""
     ahead = line_m - evidence.x_m[:, 0] - CAR_M[0] / 2
     return [
         (Signal.NONE, np.inf)

@@ -37,7 +37,7 @@ def boxes(frame: Frame) -> shapely.Polygon:
 
 
 def random_frame(generator: np.random.Generator, n: int, spread_m: float) -> Frame:
-    """One ego anywhere and `n` bodies of cars, lorries and pedestrians about it."""
+    """An ego anywhere with `n` cars, lorries and pedestrians about it."""
     x0, y0 = generator.uniform(-500, 500, 2)
     ego = (x0, y0, generator.uniform(-9, 9), generator.uniform(3, 12), generator.uniform(1.5, 2.6))
     rows = np.column_stack(
@@ -137,7 +137,7 @@ def test_time_to_contact_matches_the_hand_computed_value(other, ttc_s):
 
 
 def stepped_time_to_contact(frame: Frame, horizon_s: float, step_s: float) -> Floats:
-    """First sampled instant at which shapely sees contact; inf if there is none up to the horizon."""
+    """First sampled instant of contact by shapely; inf up to the horizon."""
     first = np.full(len(frame.ids) - 1, np.inf)
     for time_s in np.arange(0.0, horizon_s, step_s):
         bodies = polygons(
@@ -179,7 +179,7 @@ def test_time_to_contact_agrees_with_stepping_the_bodies_forward():
 
 
 def seen_by_rays(frame: Frame, occludes: Bools) -> tuple[Bools, Bools]:
-    """What shapely's segments from the ego's centre to the five points of each body see, and whether it is clear-cut.
+    """Bodies that shapely's segments from the ego reach, and whether clear-cut.
 
     A ray blocked by a sliver shorter than a micrometre, or missing a wall by as little, is no clear case.
     """

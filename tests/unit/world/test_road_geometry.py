@@ -1,4 +1,4 @@
-"""Lanes lie where an evaluation by Fresnel integrals and adaptive quadrature puts them."""
+"""Lanes lie where Fresnel integrals and adaptive quadrature put them."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -34,7 +34,7 @@ NARROW = Lanes(160.0, {1: [3.2], -1: [3.0, 0.0, 0.0005, -0.000004]})
 
 
 def bent(tmp_path: Path, rule: str = "RHT") -> tuple[RoadFile, ET.Element]:
-    """A road of all shapes with three lane sections and a lane offset."""
+    """Road of all shapes, with three lane sections and a lane offset."""
     offsets = [(0.0, 0.5), (60.0, 0.5, 0.0, 0.0012, -0.000016), (110.0, 1.5)]
     sections = (Lanes(0.0, TWO), WIDENED, NARROW)
     begin = complex(100.0, -50.0), 0.7

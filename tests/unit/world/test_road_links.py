@@ -21,7 +21,7 @@ GROWN = (
 
 @pytest.fixture
 def roads(tmp_path: Path) -> RoadFile:
-    """Road 1 with lanes that change their ids, then road 2 in the same direction and road 3 in the other one."""
+    """Road 1, whose lanes change ids, then 2 forwards and 3 backwards."""
     on = '<successor elementType="road" elementId="2" contactPoint="start"/>'
     text = file_xml(
         road_xml("1", [(LINE, 100.0, ())], GROWN, links=on),

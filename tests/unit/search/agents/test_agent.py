@@ -184,7 +184,7 @@ SB3_CONFIG = AgentConfig(hidden_sizes=(32, 32), batch_size=64, actor_learning_ra
 
 
 def learnt(agent: Sb3Agent, updates: int) -> list[float]:
-    """Critic losses of updates on one batch, whose reward is the smaller the farther the action is from 0.5."""
+    """Critic losses on one batch, whose reward falls with |action - 0.5|."""
     batch = random_batch(np.random.default_rng(0), 256)
     reward = -((batch.action - 0.5) ** 2).sum(dim=1)
     return [agent.update(batch, reward).critic_loss for _ in range(updates)]

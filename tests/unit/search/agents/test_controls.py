@@ -99,14 +99,14 @@ MIDDLE = Genes(*[0.5] * SIZE)
 
 
 def follower(*active: float, family: str = "low") -> ScriptFollower:
-    """One whose adversaries are as active as said, at their cue from the first step that counts on."""
+    """Follower whose adversaries are active as given, cued from the first step."""
     subject = ScriptFollower(FAMILIES[family])
     subject.begin(np.array([MIDDLE._replace(active=share, cue=0.0, drive=0.0) for share in active]).ravel())
     return subject
 
 
 def observed(*places: tuple[float, float] | None) -> np.ndarray:
-    """Neighbours at (x, y), m, at the ego's speed; None: one that has left the net."""
+    """Neighbours at (x, y), m, at the ego's speed; None has left."""
     rows = np.zeros((len(places), PER_ADVERSARY))
     for row, place in zip(rows, places, strict=True):
         if place is not None:

@@ -19,7 +19,7 @@ KINDS = pytest.mark.parametrize("kind", [UniformReplay, RiskPrioritizedReplay])
 
 
 def store(replay: Replay, transition: Transition, td_error: float) -> None:
-    """Adds a transition and tells its |δ|, as the learner does before it draws."""
+    """Adds a transition with its |δ|, as the learner does before drawing."""
     replay.add(transition)
     new = replay.take_unmeasured(1)
     if new is not None:

@@ -12,7 +12,7 @@ DRAWS = 4000
 
 @pytest.mark.parametrize("method", LEARNING)
 def test_a_snapshot_explores_as_the_learner_does(method, random_transition):
-    """In mean and spread of the actions; the noise is of another generator."""
+    """Mean and spread of actions agree; the noise has another generator."""
     subject = learner(method)
     live(subject, 60, random_transition, np.random.default_rng(0))
     actor = SnapshotActor(subject.snapshot(), seed=1)
@@ -77,7 +77,7 @@ def test_an_action_is_held_and_the_first_steps_are_random(random_transition):
 
 
 def test_costs_of_random_actions_are_not_priced_whatever_was_told_meanwhile(random_transition):
-    """Two episodes of one round, each of which begins with the random actions of the warm-up."""
+    """Both episodes of a round begin with the warm-up's random actions."""
     subject = learner()
     costly = [replace(random_transition(np.random.default_rng(i)), cost=1.0) for i in range(20)]
     snapshot = subject.snapshot()

@@ -1,4 +1,4 @@
-"""Peers of Stable-Baselines3 learn from the margin of an episode, and go on from their state."""
+"""Stable-Baselines3 peers learn from episodes' margins and resume from their state."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ OBSERVATION, ACTIONS = 3, 2
 
 
 def play(agent, transition, episodes, steps=4, margin=0.3):
-    """Actions of some episodes; each has the margin at its second step and ends by its horizon."""
+    """Plays episodes with the margin at the second step; returns the actions."""
     random, actions = np.random.default_rng(1), []
     for _ in range(episodes):
         agent.begin(NO_GENES)

@@ -1,4 +1,4 @@
-"""A search that goes on from an earlier run, or is told why it cannot."""
+"""Search that starts from an earlier run, or is refused."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor

@@ -84,7 +84,7 @@ def test_networks_folded_into_their_own_layout_do_the_same(pretrained, layout):
 
 
 def test_another_layout_is_read_by_names_and_values(pretrained, layout):
-    """The other problem has its adversaries in another order and one more, other bounds, and lacks a requirement."""
+    """The other problem reorders and adds adversaries, widens bounds, lacks a requirement."""
     (name, low, high), *others = layout.scene
     own = PolicyLayout(
         adversaries=("stranger", *reversed(layout.adversaries)),

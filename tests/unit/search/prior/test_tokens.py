@@ -1,4 +1,4 @@
-"""The script model sees actors as a set, where a simulation finds them at the release."""
+"""The script model sees actors as a set, as at the release."""
 
 import math
 

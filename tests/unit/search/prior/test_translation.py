@@ -17,7 +17,7 @@ from risk_sac.search.searchers import Searchers
 
 
 def low_with(*sides: str) -> Family:
-    """The scenario low without the vehicles on the other sides; mirrored where one is on the right alone."""
+    """Scenario low with vehicles on these sides; mirrored if right alone."""
     document = shipped_document("low")
     gone = {side for side in ("left", "right") if side not in sides}
     parameters = {name: each for name, each in document.parameters.items() if name.partition("_")[0] not in gone}

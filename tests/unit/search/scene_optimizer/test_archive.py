@@ -86,7 +86,7 @@ def test_a_requirement_is_aimed_at_once_it_is_nearly_violated_and_until_it_is():
 
 
 def found(seed: int, episodes: int, *, told: bool) -> int:
-    """Kinds of failure found, of those that lie side by side in a corner of the cube."""
+    """Kinds of failure found, all side by side in a cube's corner."""
     optimizer, kinds = ArchiveOptimizer(6, SceneOptimizerConfig(), seed), set()
     for _ in range(episodes):
         u = optimizer.ask()

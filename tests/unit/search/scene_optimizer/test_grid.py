@@ -1,4 +1,4 @@
-"""Samples of grids: stratified, without repetition, and of grids that no memory holds."""
+"""Samples of grids: stratified, without repetition, also of huge grids."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_a_sample_has_no_point_twice(count):
 
 
 def test_a_sample_is_stratified():
-    """Each value of each axis gets its share: of 64 points over 4, 8 and 16 values 16, 8 and 4."""
+    """Each value of an axis gets its share of the 64 points."""
     of = grid(4, 8, 16)
     levels = np.array([of.levels(number) for number in grid_sample(of, 64, seed=1)])
     for axis, size in enumerate((4, 8, 16)):

@@ -24,7 +24,7 @@ def sampler(method: str, seed: int = 3) -> RegisteredSampler:
 
 
 def near(point: np.ndarray) -> Encounter:
-    """A pass whose margin is the distance to a corner, and a failure near it."""
+    """Returns a pass with the distance to a corner, or a failure."""
     distance = float(np.linalg.norm(point - 0.1))
     struck = collision(judgement=judgement(Grade.UNAVOIDABLE)) if distance < 0.4 else None
     return Encounter(collision=struck, margins={"no_contact": 3 * distance})

@@ -170,7 +170,10 @@ def observations(count: int, dimension: int, seed: int) -> tuple[torch.Tensor, t
 
 
 def test_the_posterior_is_that_of_the_equations():
-    """m(x) = k(x)ᵀ K⁻¹ (y - c) + c,  s²(x) = 1 - k(x)ᵀ K⁻¹ k(x): Rasmussen and Williams 2006, Alg. 2.1."""
+    """Posterior mean and variance by Rasmussen and Williams 2006, Alg. 2.1.
+
+    m(x) = k(x)ᵀ K⁻¹ (y - c) + c,  s²(x) = 1 - k(x)ᵀ K⁻¹ k(x)
+    """
     points, values = observations(40, 5, seed=0)
     model = gaussian_process.condition(points, values, gaussian_process.fit(points, values, None, seed=0))
     lengthscales, constant = model.covar_module.lengthscale.detach(), model.mean_module.constant.detach()

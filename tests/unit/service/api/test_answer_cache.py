@@ -1,4 +1,4 @@
-"""The cache before a small application, in which a test decides what is stored and when a route is done."""
+"""Answer cache before a small application that the tests control."""
 
 import asyncio
 from types import SimpleNamespace
@@ -132,7 +132,7 @@ async def test_all_who_ask_after_a_change_get_the_same_new_answer(service):
 
 @asynchronous
 async def test_who_asks_while_an_older_answer_is_made_gets_what_was_stored_when_they_asked(service):
-    """And a campaign that changes faster than answers are made has them made one after another, not at once."""
+    """Answers to a fast-changing campaign are made in turn, not at once."""
     await service.ask()
     service.revisions["c1"] = 2
     service.open.clear()

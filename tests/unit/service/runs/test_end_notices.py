@@ -1,4 +1,4 @@
-"""The message to a campaign's end arrives at least once at an allowed URL, or the campaign tells why it did not."""
+"""End notices arrive at least once, or the campaign says why not."""
 
 import threading
 import time

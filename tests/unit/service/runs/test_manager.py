@@ -17,7 +17,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",))
 
 
 class Scripted:
-    """An executor whose attempts do what the test says, one after the other."""
+    """Executor whose attempts follow the test's script, one after another."""
 
     slots, cluster = math.inf, None
 
@@ -52,7 +52,7 @@ class Scripted:
 
 @pytest.fixture
 def execute(store, tmp_path):
-    """Executes a campaign of one run: how the run ends, the executor, and the manager."""
+    """Executes a one-run campaign; returns its end, the executor, the manager."""
 
     def execute(*attempts):
         executor = Scripted(*attempts)

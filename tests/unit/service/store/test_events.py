@@ -23,7 +23,7 @@ def done(metrics):
 
 @pytest.fixture
 def campaign(ledger, episode, done):
-    """Two runs of five episodes that took turns, the first of which was begun twice."""
+    """Campaign of two interleaved runs of five episodes, one begun twice."""
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",), seeds=(0, 1)))
     first, second = numbers = [run.number for run in campaign.runs]
     for number in numbers:
@@ -40,7 +40,7 @@ def campaign(ledger, episode, done):
 
 
 def story(store, campaign, position=0, limit=100):
-    """All that is told from a position on, in as many pages as it takes, and the positions."""
+    """Returns all events after a position, page by page, and their positions."""
     told, positions = [], []
     while True:
         page = store.events(campaign.id, after=position, limit=limit)
@@ -84,7 +84,7 @@ def test_whoever_comes_back_is_told_exactly_the_rest(store, campaign, limit):
 
 
 def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, done):
-    """Each run is begun, loses its worker, is begun again and ends while the others are at work, and readers read."""
+    """Each run begins, loses its worker, begins again and ends, all concurrently."""
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",), seeds=(0, 1, 2, 3)))
     together, failed = Barrier(len(campaign.runs)), Event()
 

@@ -3,5 +3,5 @@ import pytest
 
 @pytest.fixture
 def database_url(tmp_path):
-    """SQLite alone: views read what the store hands out, whichever database it is in."""
+    """Returns a SQLite URL: views do not depend on the database."""
     return f"sqlite:///{tmp_path}/test.db"

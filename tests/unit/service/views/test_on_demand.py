@@ -13,7 +13,7 @@ QUICK = -1  # a subject whose making does not wait
 def play(
     scene: Callable[[OnDemandCache[int], threading.Event, list[int]], Awaitable[None]], at_once: int = 1
 ) -> list[int]:
-    """Plays a scene with a cache whose making waits for the gate; returns the order of making."""
+    """Plays a scene with a gated cache; returns the order of making."""
     gate, order = threading.Event(), list[int]()
 
     def make(subject: int) -> bytes:

@@ -1,4 +1,4 @@
-"""How long a campaign takes until it ends, told by what it has done."""
+"""Time series and logs of a run, and the time left."""
 
 import time
 
@@ -111,7 +111,7 @@ def changed(run, **fields):
 
 
 def after_start(done, worked_s, start_s=5.0):
-    """A run of `random` that has played so many episodes after its first one."""
+    """Run of `random` that has played `done` episodes after its first."""
     pace_s = worked_s / done if done else None
     return changed(RUN, episodes_done=done + 1, pace_s=pace_s, busy_s=start_s + worked_s)
 

@@ -1,4 +1,4 @@
-"""Which scene parameters set failing episodes apart, and which cells of the ODD were played."""
+"""Totals, curves and headline of a campaign, and scene parameters' effects."""
 
 import itertools
 import json
@@ -45,7 +45,7 @@ def plain(run, record):
 
 
 def drawn(count):
-    """Records of a search: half of them contacts of several kinds, some with or after a violation without contact."""
+    """Yields random records of a search: contacts of several kinds, and violations."""
     dice = random.Random(5)
     for index in range(count):
         outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
@@ -139,7 +139,7 @@ GAPS = ((F, 12.0), (F, 14.0), (S, 13.0), (S, 30.0), (S, 40.0), (R, 11.0))
 
 @pytest.fixture
 def found(ledger):
-    """Makes the answer about low of episodes with these outcomes and gaps to the leader."""
+    """Returns low's effects for episodes with these outcomes and leader gaps."""
 
     def effects(gaps):
         campaign = ledger.create(SCENES_SPEC)

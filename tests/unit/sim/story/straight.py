@@ -1,4 +1,4 @@
-"""A straight road of three lanes, and stories on it under an ego at constant speed."""
+"""Straight road of three lanes, and stories under a constant-speed ego."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,7 +22,7 @@ ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
 def straight_net(lanes: int = 3, length_m: float = 5000.0) -> Net:
-    """East from the origin; the middle of lane `i` is at y = 3.5 i."""
+    """Road east from the origin; lane `i` has y = 3.5 i."""
     net = Net()
     own = tuple(
         NetLane(
@@ -70,7 +70,7 @@ def act(**fields: Any) -> StoryAct:
 
 
 class Drive:
-    """A story that plays on the straight road under an ego at constant speed."""
+    """Story on the straight road under an ego at constant speed."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class Drive:
         return {"ego": Present.moving(pose, self.ego_mps, 0.0, self._reach), **self._others}
 
     def to(self, time_s: float, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, StoryMotion]:
-        """Plays on to a time; returns where the actors of the story are then."""
+        """Plays on to a time; returns where the story's actors are."""
         while self.engine.time_s < time_s - STEP_S / 2:
             self.engine.advance(leads)
             self.engine.observe(self.present())
@@ -113,5 +113,5 @@ class Drive:
 
 
 def car(x_m: float, lane: int = 0, speed_mps: float = 10.0, reach: Reach = CAR, **more: Any) -> StoryActor:
-    """A story car; its reference point is at `x_m` in the middle of a lane."""
+    """Story car whose reference point is in a lane's middle at `x_m`."""
     return StoryActor(Pose(x_m, WIDTH_M * lane, 0.0), speed_mps, reach, **more)

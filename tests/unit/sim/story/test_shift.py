@@ -17,7 +17,7 @@ NEAR = {
 
 
 def begins_s(start, shift_s, *, ego_mps=20.0, do=CHANGE, after_s=6.0):
-    """When a car's event begins, by its speed; None if it does not."""
+    """Time when a car's event begins, by its speed; None if never."""
     shifts = {"car": shift_s}
     drive = Drive(story_of([one_event("car", do, start=start)]), {"car": car(60.0)}, ego_mps=ego_mps, shifts_s=shifts)
     drive.to(after_s)

@@ -39,7 +39,7 @@ def at(
 
 
 def value_of(stage: Stage, **fields: Any) -> float:
-    """The value that a condition of the first actor compares, found by bisection."""
+    """Finds by bisection the value that the first actor's condition compares."""
     low, high = -1000.0, 1000.0
     for _ in range(60):
         middle = (low + high) / 2
@@ -166,7 +166,7 @@ def test_any_or_all_actors(which: str, holds: bool) -> None:
 
 
 def moments(series: list[bool], **fields: Any) -> list[int]:
-    """Steps in which a condition holds, given those in which the bare one does."""
+    """Steps in which a condition holds, given the bare condition's truth."""
     stage, watch = stage_of(), Watch(condition(kind="variable", variable="count", rule="equal", value=1.0, **fields))
     held = []
     for step, holds in enumerate(series):

@@ -1,4 +1,4 @@
-"""Recorded contacts that verdicts were once wrong about: an archive search of 300 episodes per family, seed 901."""
+"""Recorded contacts once misjudged, from archive searches of 300 episodes, seed 901."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ from risk_sac.verdicts.evidence import Evidence, Ground
 
 
 def recorded(name: str) -> tuple[Evidence, str]:
-    """Reads a contact, such as "dense_267", and returns its evidence and the striker's id."""
+    """Returns the evidence of a contact, such as "dense_267", and its striker."""
     family, _ = name.split("_")
     with np.load(Path(__file__).with_name(f"{name}.npz")) as file:
         series = dict(file)
