@@ -1,4 +1,4 @@
-"""Egos that drive themselves: the seam, those that are shipped, and processes that speak to us."""
+"""Egos that drive themselves: the seam, shipped ones and remote processes."""
 
 from risk_sac.egos.seam import Command, Control, Ego, EpisodeStart, Perceived, Trajectory, Vehicle
 from risk_sac.world.types import Lane, Road, StopLine

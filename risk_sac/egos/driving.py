@@ -22,7 +22,7 @@ ASIDE_M = 0.3  # free width on each side of the ego's body; a vehicle within it 
 
 
 def lane_edges(lane: Lane) -> tuple[Floats, Floats]:
-    """Returns the left and right edge of a lane, `2 x p` each."""
+    """Returns a lane's left and right edge, `2 x p` each."""
     step = np.diff(lane.line, axis=1)
     ahead = step / np.maximum(np.hypot(*step), 1e-9)
     along = np.concatenate((ahead[:, :1], ahead[:, :-1] + ahead[:, 1:], ahead[:, -1:]), axis=1)
@@ -35,7 +35,7 @@ def lane_edges(lane: Lane) -> tuple[Floats, Floats]:
 
 @compiled
 def point_at(path: Floats, station_m: float) -> tuple[float, float]:
-    """Returns the place on a path at a station; its ends go on straight."""
+    """Returns a path's place at a station; its ends continue straight."""
     stations = path[STATION]
     i = 0
     while i < len(stations) - 2 and stations[i + 1] <= station_m:
@@ -48,7 +48,7 @@ def point_at(path: Floats, station_m: float) -> tuple[float, float]:
 def steering_towards(
     x_m: float, y_m: float, heading_rad: float, wheelbase_m: float, aim_x_m: float, aim_y_m: float
 ) -> float:
-    """Returns the steering of the arc that takes the rear axle to a point (pure pursuit), rad.
+    """Returns pure pursuit's steering of the rear axle to a point, rad.
 
     Source: Coulter 1992, "Implementation of the Pure Pursuit Path Tracking Algorithm".
     """
@@ -59,7 +59,7 @@ def steering_towards(
 
 
 def lane_keeping(perceived: Perceived, vehicle: Vehicle) -> float:
-    """Returns the steering that keeps the ego in the middle of its lane, rad."""
+    """Returns the steering that keeps the ego mid-lane, rad."""
     p = perceived
     return _lane_keeping(p.path, p.station_m - vehicle.length_m / 2, p.state, vehicle.wheelbase_m)
 
@@ -89,7 +89,7 @@ def bend(path: Floats, point: int) -> float:
 
 @compiled
 def cruise_speed(path: Floats, station_m: float, comfort_mps2: float, sideways_mps2: float) -> float:
-    """Returns the fastest that limits and bends, here and ahead of the front bumper, allow, m/s."""
+    """Returns the fastest speed for limits and bends here and ahead, m/s."""
     stations, limits = path[STATION], path[LIMIT]
     fastest = math.inf
     for i in range(len(stations)):
@@ -103,7 +103,7 @@ def cruise_speed(path: Floats, station_m: float, comfort_mps2: float, sideways_m
 
 @compiled
 def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehicle: Bools) -> Floats:
-    """Returns the vehicles that are in the ego's way along its path now.
+    """Returns the vehicles in the ego's way along its path now.
 
     Returns:
       `leaders x 3`: column, distance from the front bumper to the body, m, and speed along the path, m/s.
@@ -141,7 +141,7 @@ class Ahead(NamedTuple):
 
 
 class Driver:
-    """Base of egos in Python: looks out for others, and for how hard they brake."""
+    """Base of egos in Python: looks out for others and their braking."""
 
     vehicle: Vehicle
 
@@ -154,7 +154,7 @@ class Driver:
         """Releases nothing."""
 
     def ahead(self, perceived: Perceived) -> list[Ahead]:
-        """Returns what is on a collision course at constant velocity, see `risk_sac.sim.lookout`, and what leads."""
+        """Returns leaders and others on a collision course, see `risk_sac.sim.lookout`."""
         p, everybody = perceived, np.ones(len(perceived.ids), dtype=np.bool_)
         conflicts = targets(
             p.path, p.station_m, p.offset_m, 0, self.vehicle.accel_mps2, p.state, p.kind == VEHICLE, everybody
@@ -171,7 +171,7 @@ class Driver:
         return max(before.get(id_, now) - now, 0.0) / self._step_s
 
     def follow(self, perceived: Perceived, ahead: list[Ahead], headway_s: float) -> float:
-        """Returns the acceleration of `idm` behind those ahead and before a signal, m/s²."""
+        """Returns `idm`'s acceleration behind those ahead and before a signal, m/s²."""
         return idm(perceived, self.vehicle, [*ahead, *stop_at_signal(perceived)], headway_s)
 
     def keeping_lane(self, perceived: Perceived, accel_mps2: float) -> Control:
@@ -180,7 +180,7 @@ class Driver:
 
 
 def stop_at_signal(perceived: Perceived) -> list[Ahead]:
-    """Returns the stop line of a red signal, or of a yellow one that allows a stop."""
+    """Returns the stop line of a red or a stoppable yellow signal."""
     p = perceived
     gap_m = p.stop_line_m - STOP_LINE_M
     if not math.isfinite(gap_m) or p.stop_line_m < 0.0 or p.signal not in (Signal.RED, Signal.YELLOW):
@@ -192,7 +192,7 @@ def stop_at_signal(perceived: Perceived) -> list[Ahead]:
 
 
 def idm(perceived: Perceived, vehicle: Vehicle, ahead: list[Ahead], headway_s: float) -> float:
-    """Returns the acceleration of the intelligent driver model behind the nearest of those ahead, m/s².
+    """Returns the intelligent driver model's acceleration for the vehicles ahead, m/s².
 
     a = a_max [1 − (v / v₀)⁴ − (s* / s)²],  s* = s₀ + v T + v Δv / (2 √(a_max b))
 
@@ -213,13 +213,13 @@ def idm(perceived: Perceived, vehicle: Vehicle, ahead: list[Ahead], headway_s: f
 
 
 def time_to_collision(speed_mps: float, ahead: list[Ahead]) -> float:
-    """Returns the time until the first of those ahead is reached, s; else inf."""
+    """Returns the time to reach the first of `ahead`, s; else inf."""
     closing = ((each.gap_m, speed_mps - each.speed_mps) for each in ahead)
     return min((gap_m / closing_mps for gap_m, closing_mps in closing if closing_mps > 1e-6), default=math.inf)
 
 
 def needed_braking(speed_mps: float, ahead: list[Ahead]) -> float:
-    """Returns the braking that just avoids all of those ahead, if they go on as they do, m/s²."""
+    """Returns the least braking that avoids all of `ahead`, m/s²."""
     return max((_needed(speed_mps, each) for each in ahead), default=0.0)
 
 

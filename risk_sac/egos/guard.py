@@ -1,4 +1,4 @@
-"""Checks every answer of an ego; an answer that is late, malformed or missing makes the episode invalid.
+"""Checks ego answers: late, malformed or missing ones make the episode invalid.
 
 Nothing drives in the ego's place, and no rate counts the episode. `DEAD_AFTER` such episodes in a row fail the run.
 """
@@ -88,7 +88,7 @@ class Guarded:
             return self._asked(lambda: sound(self._ego.act(perceived)))
 
     def close(self) -> None:
-        """Closes the ego; what goes wrong is logged, since its episodes are over."""
+        """Closes the ego; errors are only logged, as its episodes are over."""
         try:
             with self._state if self._foreign else contextlib.nullcontext():
                 self._asked(lambda: self._ego.close())
@@ -176,7 +176,7 @@ def _text(value: object) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """Names the file and line that raised, as " (mine.py, line 12)"; empty where the guard itself did."""
+    """Names file and line that raised; empty if the guard did."""
     *_, last = traceback.extract_tb(error.__traceback__) or [None]
     return f" ({Path(last.filename).name}, line {last.lineno})" if last and last.filename != __file__ else ""
 
@@ -190,7 +190,7 @@ _leave = os._exit
 
 
 def _confine(deadline_s: float) -> None:
-    """Until `_free`: raises `_Overdue` at each deadline, and turns `os._exit` into an exception.
+    """Until `_free`, raises `_Overdue` at deadlines and turns `os._exit` into an exception.
 
     Only in the main thread, and the former where SIGALRM has no other use. A signal ends loops, sleeping and waiting
     of Python code, but not compiled code that never returns.

@@ -116,7 +116,7 @@ BRAKE_MPS2 = 9.0  # hardest braking, that of SUMO's driver on dry asphalt
 
 
 def perceive(frame: Frame, belief: Belief, along: Along, signals: tuple[Signal, ...]) -> Perceived:
-    """Returns the actors of a frame that the ego knows of by its sensor and its memory."""
+    """Returns the frame's actors that the ego senses or remembers."""
     known = belief.known
     path, station_m, offset_m, _ = along
     return Perceived(
@@ -204,7 +204,7 @@ class EgoPilot:
 
 @compiled
 def shown(state: Floats, known: Bools) -> Floats:
-    """Returns the columns of known actors, with the rows that a sensor measures."""
+    """Returns known actors' columns with the rows that a sensor measures."""
     measured = np.empty((state.shape[0], int(known.sum())))
     column = 0
     for i in range(state.shape[1]):

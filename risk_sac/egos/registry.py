@@ -1,4 +1,4 @@
-"""Lists the egos that the operator has registered; a request can only name one.
+"""Lists the egos that the operator registers; requests can only name them.
 
 Python egos are entry points of the group `risk_sac.egos`, beside the shipped ones. Remote ones are tables of the TOML
 file that `RISK_SAC_EGOS` names; remote/README.md shows one. A Python ego's card is read from its source, so that none
@@ -153,7 +153,7 @@ def cards() -> tuple[EgoCard, ...]:
 
 
 def installed() -> dict[str, str]:
-    """Returns the versions of this machine's Python egos by name; for one that cannot be used, the reason."""
+    """Returns versions of this machine's Python egos, or why one is unusable."""
     versions = {}
     for name, point in _points().items():
         try:
@@ -164,7 +164,7 @@ def installed() -> dict[str, str]:
 
 
 def card_of(name: str) -> EgoCard:
-    """Returns the card of an ego; a ConfigError if it does not exist or cannot be used."""
+    """Returns an ego's card; raises a ConfigError if absent or unusable."""
     points, remotes = _points(), _remotes()
     if name in points:
         return python_card(points[name])
@@ -180,7 +180,7 @@ def card_of(name: str) -> EgoCard:
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
-    """Returns the ego with the version and response time of its driver, defects, sensors and actuators.
+    """Returns the ego with its driver's response time and all parts' version.
 
     Raises:
       ConfigError: there is no such driver or defect, a defect does not fit it, or it has another version than the ego
@@ -207,7 +207,7 @@ def pinned(ego: EgoConfig) -> EgoConfig:
 
 
 def instances_of(ego: EgoConfig) -> int | None:
-    """Returns how many processes of a run may play an ego at a time; None for any number.
+    """Returns how many processes may play an ego at once; None: unlimited.
 
     Raises:
       ConfigError: there is no such driver.
@@ -219,7 +219,7 @@ def instances_of(ego: EgoConfig) -> int | None:
 
 
 def load(ego: EgoConfig, server: int = 0) -> Guarded | None:
-    """Returns the driver that an ego names, ready to drive; None for SUMO's.
+    """Returns an ego's driver, ready to drive; None for SUMO's.
 
     Args:
       ego: names the driver.
@@ -251,7 +251,7 @@ def load(ego: EgoConfig, server: int = 0) -> Guarded | None:
 
 
 def check(ego: EgoConfig) -> None:
-    """Loads an ego and closes it again; a ConfigError if it cannot be loaded."""
+    """Loads an ego and closes it; raises a ConfigError if that fails."""
     loaded = load(ego)
     if loaded is not None:
         loaded.close()
@@ -266,7 +266,7 @@ def refuse_class(source: str) -> NoReturn:
 
 
 def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
-    """Returns the class of a Python ego and its card; a ConfigError if it cannot be loaded.
+    """Returns a Python ego's class and card; raises a ConfigError otherwise.
 
     Args:
       source: name of a registered ego, or `module:Class`.
@@ -339,7 +339,7 @@ def _declared(source: bytes, name: str) -> dict[str, Any]:
 
 
 def _hash(file: Path, in_package: bool) -> str:
-    """Of a module's source, and of those beside it in its package, which it may be made of."""
+    """Returns the hash of a module's source and its package's other modules."""
     digest = hashlib.sha256()
     for each in sorted(file.parent.glob("*.py")) if in_package else [file]:
         digest.update(each.name.encode() + b"\0" + each.read_bytes() + b"\0")

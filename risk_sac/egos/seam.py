@@ -1,4 +1,4 @@
-"""Interface of an ego that drives itself: what it perceives, and what it may command.
+"""Interface of an ego that drives itself: its perceptions and commands.
 
 An ego gets what the line-of-sight sensor and its memory have, and a bicycle with limits (`risk_sac.egos.pilot`) does
 as much of a command as a car can. Units are metric: x east, y north, heading 0 = east, counter-clockwise, radians; a
@@ -70,7 +70,7 @@ class Control(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Command: places and speeds at `k` rising times from now on, two or more."""
+    """Command: places and speeds at `k` ≥ 2 rising times from now."""
 
     time_s: Floats
     x_m: Floats
@@ -82,7 +82,7 @@ Command = Control | Trajectory
 
 
 class Ego(Protocol):
-    """Driver in lock-step: one command for each perceived frame, which holds for one step.
+    """Driver in lock-step: a command per perceived frame, held for one step.
 
     The class declares as literals, which are read without running it: `version`, `response_time_s` (within which it
     responds to a danger, from which its requirements follow); if it is not 60, `deadline_s` for each answer; and, if a

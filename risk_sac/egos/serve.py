@@ -66,7 +66,7 @@ class Sessions:
         return ego_pb2.StartReply(version=self._version, socket=self.socket)
 
     def act(self, requests: Iterator[Any], context: Any) -> Iterator[Any]:
-        """Answers an episode's steps; the session is over with them, also if the client is gone."""
+        """Answers an episode's steps; then ends the session, even without the client."""
         name, path = "", np.empty((0, 0))
         try:
             for request in requests:
@@ -95,7 +95,7 @@ class Sessions:
 
 @contextmanager
 def _told(context: Any) -> Iterator[None]:
-    """Tells the client how an ego has failed; the deadline is the client's."""
+    """Tells the client an ego's failure; the deadline is the client's."""
     try:
         yield
     except EgoFailed as failed:
@@ -104,7 +104,7 @@ def _told(context: Any) -> Iterator[None]:
 
 
 def warm_up(ego: Guarded) -> None:
-    """Lets an ego drive one step on a straight road, so that compiling costs no deadline."""
+    """Drives an ego one step, so that compilation precedes any deadline."""
     along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
     lane = Lane("lane", np.array([along, still]), 3.3, 13.9, "", "", False, False, (), True)
     car = Vehicle(length_m=4.6, width_m=1.85)
@@ -127,7 +127,7 @@ def warm_up(ego: Guarded) -> None:
 
 
 def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
-    """Starts a server and returns it with its port; a RuntimeError if it cannot listen on the address."""
+    """Returns a started server and its port; RuntimeError if it cannot listen."""
     answers = {
         "Start": partial(grpc.unary_unary_rpc_method_handler, sessions.start),
         "Act": partial(grpc.stream_stream_rpc_method_handler, sessions.act),
@@ -148,13 +148,13 @@ def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
 
 
 def table(name: str, address: str, card: EgoCard) -> str:
-    """Returns the table of the file of RISK_SAC_EGOS that registers a served ego."""
+    """Returns the TOML table for RISK_SAC_EGOS that registers a served ego."""
     told = {"address": address} | card.model_dump(include={"version", "summary", "response_time_s", "deadline_s"})
     return "\n".join([f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())])
 
 
 def main() -> None:
-    """Serves until it is killed; prints the port and the version, or what registers it, once it listens."""
+    """Serves until killed; prints port and version, or registration, once it listens."""
     parser = argparse.ArgumentParser(description="Serves a Python ego by the protocol of ego.proto.")
     parser.add_argument("ego", help="name of a registered one, or module:Class")
     parser.add_argument("--address", default="127.0.0.1:0", help="to listen on; port 0 is any (default: %(default)s)")

@@ -1,1 +1,1 @@
-"""Planners of others behind the seam, each on a package that the extra `planners` brings."""
+"""Third-party planners behind the seam; packages come with the extra `planners`."""

@@ -1,4 +1,4 @@
-"""Planners of the package `fiss-planner`, which sample in a Frenet frame, as its documentation runs them.
+"""Frenet planners of the package `fiss-planner`, run as its documentation does.
 
 Source: Sun et al. 2022, "FISS: A Trajectory Planning Framework Using Fast Iterative Search and Sampling Strategy for
 Autonomous Driving"; Sun et al. 2023, "FISS+"; for FOP Werling et al. 2010. Settings are the package's own, where no
@@ -29,7 +29,7 @@ BEYOND_S = 0.5  # time that predictions reach beyond the longest plan
 
 
 class FrenetPlanner:
-    """The package's local planner on the road that the seam tells; the car follows its plans.
+    """The package's local planner on the seam's road; the car follows plans.
 
     The seam's tracker follows them. The package's own MPC does not know the wheels' angle. In three staged starts,
     which are too few to tell them apart, that went up to 1.4 m beyond a plan's widest point, the tracker up to 0.4 m.
@@ -39,7 +39,7 @@ class FrenetPlanner:
     _told: Road | None = None
 
     def reset(self, episode: EpisodeStart) -> None:
-        """Begins an episode; a ValueError if it has no road, as from a client that knows none."""
+        """Begins an episode; raises a ValueError for one without a road."""
         if not episode.road.lanes:
             raise ValueError("the episode has no road, without which this planner cannot plan")
         if episode.road is not self._told:  # the same object on the same road, within a process
@@ -112,7 +112,7 @@ class FrenetPlanner:
 
 
 def road_map(road: Road, numbers: Mapping[str, int]) -> Any:
-    """Returns the package's map of a road, with numbered lanes and stop lines."""
+    """Returns the package's map of a road: numbered lanes and stop lines."""
     planner_map = fp.RoadMap()
     for road_lane in road.lanes:
         lane, (left, right) = fp.MapLane(), lane_edges(road_lane)
@@ -134,7 +134,7 @@ def road_map(road: Road, numbers: Mapping[str, int]) -> Any:
 
 
 def vehicle_params(car: Vehicle) -> Any:
-    """Returns the package's parameters of the car; the limits that are not given here are the package's."""
+    """Returns the car's parameters for the package, which sets other limits."""
     params = fp.VehicleParams()
     params.length, params.width, params.wheelbase = car.length_m, car.width_m, car.wheelbase_m
     params.rear_axle_to_center = car.wheelbase_m / 2
@@ -144,7 +144,7 @@ def vehicle_params(car: Vehicle) -> Any:
 
 
 class Fop(FrenetPlanner):
-    """Frenet optimal planner: generates every candidate, keeps the cheapest valid one (fiss-planner 1.0.0)."""
+    """Frenet optimal planner: keeps the cheapest valid candidate (fiss-planner 1.0.0)."""
 
     version = "1.0.0"
     response_time_s = 0.5
@@ -152,7 +152,7 @@ class Fop(FrenetPlanner):
 
 
 class Fiss(FrenetPlanner):
-    """FISS: searches the end states iteratively, guided by the previous plan (fiss-planner 1.0.0)."""
+    """FISS: searches end states iteratively from the previous plan (fiss-planner 1.0.0)."""
 
     version = "1.0.0"
     response_time_s = 0.5

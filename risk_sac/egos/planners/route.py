@@ -1,4 +1,4 @@
-"""Prepares a planner's input: lanes along the route, stop lines, room, others in view."""
+"""Prepares a planner's input: route lanes, stop lines, room, others in view."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ BESIDE_M = 0.1  # distance between the ego's body and the lane's edge
 
 
 def lanes_ahead(road: Road, start: str) -> list[str]:
-    """Returns the lanes along the route from a lane on, with the fewest lane changes.
+    """Returns route lanes from `start` on, with the fewest lane changes.
 
     It ends on the lane from which the route leads no farther. If the route is out of reach, it is the first lane alone.
     """
@@ -49,7 +49,7 @@ class SignalStops:
         self._yellow: set[int] = set()  # lines at which it stops
 
     def at(self, line: int, signal: Signal, speed_mps: float, way_m: float) -> bool:
-        """Decides for the signal of a stop line, which is known by any number that stays its own."""
+        """Decides for a stop line's signal; `line` is any lasting number."""
         possible = speed_mps * speed_mps <= 2.0 * LAST_STOP_MPS2 * way_m
         if signal is Signal.YELLOW and possible:
             self._yellow.add(line)
@@ -75,7 +75,7 @@ def stops(road: Road, perceived: Perceived, signals: SignalStops) -> list[bool]:
 
 
 def way_to_stop_m(p: Perceived, signals: SignalStops) -> float | None:
-    """Returns the way to where a signal stops the ego; None if none does, or none yet."""
+    """Returns the way to a signal's stop; None without one, or early."""
     if not math.isfinite(p.stop_line_m):
         return None
     speed, station_m = float(p.state[SPEED, 0]), p.station_m + p.stop_line_m
@@ -86,14 +86,14 @@ def way_to_stop_m(p: Perceived, signals: SignalStops) -> float | None:
 
 
 def room_aside_m(lanes: Sequence[Lane], p: Perceived, car: Vehicle) -> float:
-    """Returns how far from the middle of the ego's lane its body still lies within it."""
+    """Returns how far aside the ego's body stays within its lane."""
     x_m, y_m = p.state[[X, Y], 0]
     own = min(lanes, key=lambda lane: float(np.hypot(lane.line[0] - x_m, lane.line[1] - y_m).min()))
     return max(own.width_m / 2 - car.width_m / 2 - BESIDE_M, BESIDE_M)
 
 
 def in_view(p: Perceived) -> Bools:
-    """Returns which objects a planner heeds: all others but the vehicles behind in its lane, which react."""
+    """Returns which objects a planner heeds: all except vehicles behind in lane."""
     x_m, y_m, heading, length_m, width_m = p.state[[X, Y, HEADING, LENGTH, WIDTH], 0]
     away_x, away_y = p.state[X] - x_m, p.state[Y] - y_m
     along_m = away_x * math.cos(heading) + away_y * math.sin(heading)
@@ -104,7 +104,7 @@ def in_view(p: Perceived) -> Bools:
 
 
 def in_pieces(road: Road, piece_m: float, spacing_m: float) -> Road:
-    """Returns the road with long lanes cut into pieces, and a point every so many metres along each.
+    """Returns the road with long lanes cut into pieces of spaced points.
 
     A planner may work on whole lanes wherever the ego is. Pieces of lanes beside each other are cut alike.
     """
