@@ -77,7 +77,7 @@ class FormulaError(ConfigError):
 
 
 class MapError(ConfigError):
-    """A map that cannot be read, or on which a pattern fails."""
+    """A map that cannot be read or does not fit a pattern."""
 
 
 class SceneError(RiskSacError):

@@ -62,7 +62,7 @@ def add_campaign_flags(parser: Parser, *, families: str, methods: str, seeds: in
 
 
 def add_budget_flags(parser: Parser) -> None:
-    """Adds the flags of a run's budget, for each of a campaign's."""
+    """Adds the flags of one run's budget, also for campaigns' runs."""
     for name, (type_, metavar, what) in BUDGET.items():
         flag = f"--{name.replace('_', '-')}"
         parser.group("budget").add_argument(flag, type=type_, metavar=metavar, help=what)
@@ -268,7 +268,7 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
 
 
 def is_file(name_or_file: str) -> bool:
-    """Whether a word with a folder or ending names a file."""
+    """Whether a word names a file: it has a folder or ending."""
     if Path(name_or_file).suffix or "/" in name_or_file:
         if not Path(name_or_file).is_file():
             remedy = "check its path, or name a scenario of `risk-sac scenarios list`"

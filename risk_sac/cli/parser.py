@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
         self.error(f"there is no flag {name}" + _sentence(hint))
 
     def error(self, message: str) -> NoReturn:
-        """Ends the program with one line of error and a hint."""
+        """Ends the program with a line on the error and a hint."""
         complain(f"{self.prog}: {message.removeprefix('argument ')}\n`{self.prog} --help` lists what it takes.")
         raise SystemExit(MISUSED)
 

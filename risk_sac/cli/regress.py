@@ -134,7 +134,7 @@ FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)
 
 
 def junit(regression: Regression) -> bytes:
-    """Writes JUnit: fixed passes, known is skipped, flaky or incomparable is error."""
+    """Returns JUnit: fixed passes, known is skipped, flaky or incomparable is error."""
     suite = TestSuite("regression")
     suite.add_property("ego", regression.ego.model_dump_json())
     suite.add_testcases([_case(case) for case in regression.cases])

@@ -241,12 +241,12 @@ class Client:
         return self._made(campaign_id, failure_id, "picture.png" if twin is None else f"twins/{_part(twin)}.png", PNG)
 
     def export(self, campaign_id: str, failure_id: str, format_: str) -> bytes:
-        """Exports a failure in a format such as "openscenario", or a zip."""
+        """Exports a failure in a format ("openscenario"); several files as a zip."""
         path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/export"
         return self._transport.ask("GET", path, query={"format": format_}, patience_s=MAKING_S).content
 
     def bundle(self, campaign_id: str, failure_id: str, *, aim: Aim | None = None) -> bytes:
-        """Returns a failure as a self-contained file; minimising takes 10-20 s."""
+        """Returns a self-contained file of a failure; minimising (`aim`) takes 10-20 s."""
         names = {None: "bundle.npz", "smallest": "core.npz", "most-plausible": "most-plausible.npz"}
         return self._made(campaign_id, failure_id, names[aim], BUNDLE)
 
@@ -286,7 +286,7 @@ class Client:
         return self._transport.ask("GET", f"{_path(campaign_id)}/report", query=query).text
 
     def cancel(self, campaign_id: str) -> Campaign:
-        """Stops a campaign slowly and keeps its results; leaves an ended one."""
+        """Cancels a campaign, keeping results; takes a while, no-op once ended."""
         return read(Campaign, self._transport.ask("POST", f"{_path(campaign_id)}/cancel"))
 
     def delete(self, campaign_id: str) -> None:
@@ -323,7 +323,7 @@ class Client:
         timeout_s: float | None = None,
         away_s: float = AWAY_S,
     ) -> Campaign:
-        """Returns the ended campaign; passes each state on the way to `on_change`."""
+        """Returns the ended campaign; calls `on_change` with each state before."""
         for campaign in self.follow(campaign_id, timeout_s=timeout_s, away_s=away_s):
             if on_change is not None:
                 on_change(campaign)

@@ -115,7 +115,7 @@ def make_bundle(
     policy: FrozenPolicy | None,
     core: Core | None = None,
 ) -> Bundle:
-    """Bundles a just played failure; leaves out too large a policy."""
+    """Bundles a failure just played, without a policy that is too large."""
     if policy is not None and sum(layer.nbytes for layer in policy.layers) > MOST_POLICY_BYTES:
         policy = None
     manifest = Manifest(

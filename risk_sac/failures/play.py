@@ -156,7 +156,7 @@ Prepared = Mapping[Path, tuple[RunResults, RiskSacEnv]]
 
 
 def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
-    """Opens the playable runs; a line states the reason of the others."""
+    """Opens the playable runs; a line per other run states why."""
     prepared = {}
     for folder in folders:
         results = read_results(folder)
@@ -168,7 +168,7 @@ def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
 
 
 def _say(file: Path, *lines: dict[str, object]) -> None:
-    """Appends lines in one write: several processes share the file, some killed."""
+    """Appends lines in one write, since sharing processes may be killed."""
     with file.open("ab", buffering=0) as output:
         output.write("".join(f"{json.dumps(line)}\n" for line in lines).encode())
 

@@ -94,7 +94,7 @@ class Metric:
         return value
 
     def interval(self, value: float, counts: Counts) -> tuple[float, float] | None:
-        """Returns Wilson's 95 % interval of one run's rate; None without trials."""
+        """Returns Wilson's 95 % interval of one run's rate; None for non-rates."""
         if self.trials is None:
             return None
         trials = self.trials(counts)
@@ -155,7 +155,7 @@ def _values(metric: Metric, metrics: Sequence[RunMetrics]) -> list[float]:
 
 
 def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
-    """Sums each count over the runs; equal finds of two count twice."""
+    """Sums each count over runs; what two runs found counts twice."""
     return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in Counts.model_fields})
 
 

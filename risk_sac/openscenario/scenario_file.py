@@ -1,4 +1,4 @@
-"""Imports a scenario file, or a variation with its scenario, as document."""
+"""Imports a scenario file, or variation with its scenario, as a document."""
 
 import math
 import re

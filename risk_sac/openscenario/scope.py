@@ -49,7 +49,7 @@ class _Code(NamedTuple):
 
 
 def translated(text: str, name_of: Callable[[str], Expression]) -> Expression:
-    """Translates the content of `${…}`; `name_of` gives the document's parameter names.
+    """Translates the content of `${…}`; `name_of` maps parameters to document expressions.
 
     Raises:
       ConfigError: it is no expression, or too long, or a name is unknown.

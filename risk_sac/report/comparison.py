@@ -287,7 +287,7 @@ def _cells(runs: Sequence[FinishedRun]) -> Iterator[Cell]:
 
 
 def _tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
-    """Tests the other methods against the first; corrects declared tests apart."""
+    """Tests methods against the first per family and phase, declared ones apart."""
     phases: tuple[Phase, ...] = ("search", "evaluation") if spec.budget.evaluation_episodes else ("search",)
     for family in spec.families:
         by_method = _by_method(family, methods, runs)

@@ -60,7 +60,7 @@ def window_pcr(run: FinishedRun) -> Floats:
 
 
 def _window_rate(run: FinishedRun, counted: Callable[[EpisodeRecord], bool]) -> Floats:
-    """Returns a rate after each episode over the newest driven; first 0."""
+    """Returns the rate after each episode over the newest driven episodes."""
     driven = [record.outcome is not Outcome.INVALID for record in run.phase("search")]
     happened = [counted(record) for record in run.phase("search") if record.outcome is not Outcome.INVALID]
     total, after = np.concatenate(([0], np.cumsum(happened))), np.cumsum(driven)

@@ -164,7 +164,7 @@ def _count_requirements(counts: Mapping[standards.CellKey, _Count], family: str,
 def _power(
     comparison: Comparison, family: FamilyName, id_: str, benchmark: Sequence[BenchmarkRun] | None
 ) -> CellPower | None:
-    """Returns what a scenario's best method finds; None if nothing was measured."""
+    """Returns what the best method finds in a scenario; None if unmeasured."""
     spec = comparison.spec.model_copy(update={"families": (family,)})
     played = [one for one in played_by(comparison.runs) if one.family == family]
     methods = [one for one in power_of(spec, played, benchmark).methods if one.defects]

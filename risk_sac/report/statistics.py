@@ -123,7 +123,7 @@ def wilcoxon_p(differences: Sequence[float]) -> float:
 
 
 def smallest_p(pairs: int) -> float:
-    """Returns the least p of `wilcoxon_p`: all differences on one side."""
+    """Returns `wilcoxon_p`'s least p for `pairs`: all differences on one side."""
     return min(1.0, 2 / (1 << pairs))
 
 
@@ -289,7 +289,7 @@ def _comparison(methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) ->
 
 
 def _shared_steps(family: str, methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) -> int:
-    """Returns the most steps that all methods may spend and have measured."""
+    """Returns the most run steps allowed and measured for all methods."""
     measured_for: dict[tuple[str, str], int] = {}
     for run in runs:
         if run.family == family:

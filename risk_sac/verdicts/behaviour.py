@@ -150,7 +150,7 @@ def _new_follower(
 def _pacing(
     e: Evidence, actor: int, frames: NDArray[np.intp], ahead_m: Floats, left_m: Floats, cos: Floats
 ) -> tuple[float, float]:
-    """Finds the longest time level with a vehicle, and its beginning."""
+    """Finds the longest pacing of a vehicle (level, same speed), and start."""
     speed = e.speed_mps[frames]
     level = np.abs(ahead_m) < (e.length_m + e.length_m[actor]) / 2
     level &= (np.abs(left_m) < 1.5 * e.ground.lane_width_m) & (cos > SAME_WAY_COS)

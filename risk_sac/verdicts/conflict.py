@@ -220,7 +220,7 @@ def collision_courses(path: Path, speed: Floats, size: Size, motion: MovingBox[F
 
 
 def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
-    """Tells whether the pedestrian is within 1 s of the carriageway, `T`.
+    """Tells whether the pedestrian is on the carriageway or 1 s away.
 
     It holds in all frames for a pedestrian that was struck beside the carriageway: there the ego left the carriageway.
     """

@@ -194,7 +194,7 @@ def recorded_motion(evidence: Evidence, actor: int) -> MovingBox[Floats]:
 
 
 def recorded_contact(evidence: Evidence, striker: int) -> Contact:
-    """Returns the striker's contact with the ego; its `other` is 1."""
+    """Returns the striker's contact in the last step; its `other` is 1."""
     e, both, steps = evidence, [0, striker], np.zeros((2, WIDTH + 1, 2))
     for state, t in zip(steps, (-2 if len(e.time_s) > 1 else -1, -1), strict=True):
         state[[X, Y, HEADING]] = e.x_m[t, both], e.y_m[t, both], e.heading_rad[t, both]

@@ -177,7 +177,7 @@ def in_view_from(evidence: Evidence, striker: int) -> int | None:
 
 
 def _near(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> Bools:
-    """Whether the ego sees a pedestrian ahead near its corridor, `T`."""
+    """Whether the ego sees a carriageway pedestrian near its corridor, `T`."""
     e, ground = evidence, evidence.ground
     if e.kind[striker] != Kind.PEDESTRIAN:
         return np.zeros(len(e.time_s), dtype=np.bool_)
@@ -192,7 +192,7 @@ def _near(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> Bools:
 
 
 def _aware_from(near: Bools, conflict: int) -> int:
-    """Finds since when the ego saw the striker in its way."""
+    """Finds since when the ego saw the striker near its way."""
     elsewhere = np.flatnonzero(~near[:conflict])
     return int(elsewhere[-1]) + 1 if len(elsewhere) else 0
 
@@ -266,7 +266,7 @@ def fault(parts: Parts) -> Fault:
 
 
 def came_first(evidence: Evidence, striker: int) -> bool:
-    """Tells whether a vehicle entered the junction before the ego's green.
+    """Tells whether a vehicle was in the junction before the ego's green.
 
     The ego, which enters on that green, has to yield to one that entered lawfully.
 

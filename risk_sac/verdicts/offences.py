@@ -149,7 +149,7 @@ def reverses(evidence: Evidence, striker: int) -> bool:
 
 
 def speeds(evidence: Evidence, actor: int) -> bool:
-    """Whether the vehicle exceeded the limit by 10 % within 3 s.
+    """Whether a vehicle exceeded 110 % of the limit within 3 s.
 
     The ego may be as fast as at the release, less 2 m/s² from 1.15 s after it on.
     """
@@ -164,14 +164,14 @@ def speeds(evidence: Evidence, actor: int) -> bool:
 def pedestrian_on_red(evidence: Evidence, striker: int) -> bool:
     """Whether the pedestrian stepped on red onto the crossing of the contact.
 
-    A pedestrian that steps onto it on green and meets red half way has broken no rule.
+    `KERB_M` beside it counts. A pedestrian that steps onto it on green and meets red half way has broken no rule.
     """
     stepped = _stepped_onto_crossing(evidence, striker)
     return stepped is not None and int(evidence.link[stepped, striker]) in RED
 
 
 def took_crossing(evidence: Evidence, striker: int) -> bool:
-    """Whether the ego entered a crossing after a pedestrian that had green."""
+    """Whether the ego entered a crossing after a pedestrian without red."""
     stepped = _stepped_onto_crossing(evidence, striker)
     if stepped is None or int(evidence.link[stepped, striker]) in RED:
         return False

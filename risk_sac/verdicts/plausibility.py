@@ -73,7 +73,7 @@ def judge_observed(observed: Iterable[Observed], ids: Sequence[str], traffic: Un
 
 
 def in_words(fact: BehaviourFact) -> str:
-    """Says a fact with its share: "…: 1 of 3,000 lane changes"."""
+    """Formats a fact with its share: "… 1 of 3,000 lane changes"."""
     feature = FEATURES[fact.feature]
     one_in = 1.0 / fact.probability
     digits = 1 - math.floor(math.log10(one_in)) if one_in > 10.0 else 0

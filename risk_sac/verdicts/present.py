@@ -78,7 +78,7 @@ def _corners(area: Area) -> list[tuple[float, float]]:
 
 @compiled
 def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_width_m: float) -> Crossings:
-    """Finds a path's crossings between two stations, with spots along each."""
+    """Finds crossings on part of a path, with spots including waiting areas."""
     entries, count = np.empty((len(boxes), 2)), 0
     spots, filled = np.empty((64 * len(boxes), 4)), 0
     for k in range(len(boxes)):
@@ -115,7 +115,7 @@ def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_wid
 
 
 def concealing(codes: Iterable[int]) -> Bools:
-    """Tells by codes of frames and recordings which bodies conceal others."""
+    """Tells by body codes which bodies hide what is behind them."""
     return np.array([body_of(int(code)).conceals for code in codes], dtype=np.bool_)
 
 
@@ -270,7 +270,7 @@ def must_yield(link: int) -> bool:
 
 @compiled
 def soon_walked(street: Street, other: MovingBox[float]) -> bool:
-    """Whether a pedestrian enters the carriageway or a crossing within 1 s."""
+    """Whether a pedestrian is on carriageway or crossing, or within 1 s."""
     if len(street.roadway.sides) == 0:
         return True
     for k in range(KERB_STEPS + 1):

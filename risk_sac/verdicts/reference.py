@@ -129,7 +129,7 @@ def grade(keeps: Mapping[str, bool], drivers: Collection[str] = PREVENTING) -> G
 def _braking(
     evidence: Evidence, path: Path, track: MovingBox[Floats], driver: int, began: int, perceives_s: float
 ) -> RolloutEnd | None:
-    """Drives against an actor with a braking driver; None if struck before."""
+    """Brakes against one actor; None if struck before the driver perceives."""
     e = evidence
     first = began + round(perceives_s / e.step_s)
     if first >= len(e.time_s) - 1:
@@ -204,7 +204,7 @@ class History(NamedTuple):
 
 
 class MetActor(NamedTuple):
-    """The actor that mattered most at a violation, and its conflict."""
+    """The actor that mattered most at a violation, and the ego's conflict."""
 
     column: int  # in the evidence
     conflict: Conflict

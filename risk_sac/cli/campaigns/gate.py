@@ -234,7 +234,7 @@ def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
 def junit(
     results: Results, service_url: str, url: str, bounds: GateBounds, failures: Mapping[str, Sequence[Episode]]
 ) -> JUnitXml:
-    """Writes a campaign's report; `failures` has first failures by run id.
+    """Returns a campaign's report; `failures` maps run ids to first failures.
 
     A run is an error where it failed or was cancelled, and names its failures whatever the bounds are.
     """

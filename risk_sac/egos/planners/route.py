@@ -75,7 +75,7 @@ def stops(road: Road, perceived: Perceived, signals: SignalStops) -> list[bool]:
 
 
 def way_to_stop_m(p: Perceived, signals: SignalStops) -> float | None:
-    """Returns the way to a signal's stop; None without one, or early."""
+    """Returns the way to a signal's stop, or None while none applies."""
     if not math.isfinite(p.stop_line_m):
         return None
     speed, station_m = float(p.state[SPEED, 0]), p.station_m + p.stop_line_m

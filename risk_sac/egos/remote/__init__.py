@@ -1,1 +1,1 @@
-"""Egos in their own processes, by the protocol `ego.proto`; extra `remote`."""
+"""Egos in their own processes, by `ego.proto`; needs the extra `remote`."""

@@ -48,7 +48,7 @@ class SumoLog:
 
 @contextmanager
 def _tapped() -> Iterator[SumoLog]:
-    """Records this process's calls to libsumo, which `risk_sac.sim` calls as module."""
+    """Records this process's calls to libsumo, which `risk_sac.sim` calls as a module."""
     log = SumoLog()
 
     def start(command: list[str], own: Any = libsumo.start) -> None:
