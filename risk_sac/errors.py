@@ -20,7 +20,7 @@ from difflib import get_close_matches
 
 
 class RiskSacError(Exception):
-    """Root of the tree; catch this to catch everything this project raises on purpose."""
+    """Root of all errors that this project raises on purpose."""
 
 
 class ConfigError(RiskSacError, ValueError):
@@ -77,7 +77,7 @@ class FormulaError(ConfigError):
 
 
 class MapError(ConfigError):
-    """A map cannot be read, or a pattern does not fit where it is wanted."""
+    """A map that cannot be read or does not fit a pattern."""
 
 
 class SceneError(RiskSacError):
@@ -97,7 +97,7 @@ class SimulationError(RiskSacError):
 
 
 class EgoFailed(RiskSacError):
-    """A registered ego cannot be driven on with; `reason` is the rule's name, such as "ego_deadline"."""
+    """A registered ego that fails; `reason` is the rule's name ("ego_deadline")."""
 
     def __init__(self, message: str, *, reason: str) -> None:
         super().__init__(message)
@@ -113,7 +113,7 @@ class DamagedCheckpoint(CheckpointError):
 
 
 class DamagedError(RiskSacError):
-    """A file that carries its own checksum is not as it was written."""
+    """A file that does not match its own checksum."""
 
 
 class NotFinite(RiskSacError):
@@ -121,7 +121,7 @@ class NotFinite(RiskSacError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Returns a question that names the closest known name; empty where none is close.
+    """Asks whether the closest known name was meant; empty if none is.
 
     The dashes of flags make no two names alike.
     """

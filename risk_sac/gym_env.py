@@ -1,4 +1,4 @@
-"""Environment that Gymnasium makes by name: one family, any ego and ODD, with pictures.
+"""Environment that Gymnasium makes by name: one family, any ego and ODD.
 
 gymnasium.make("risk_sac.env.env:RiskSAC/Low-v0", ego="careful", odd={...}, render_mode="rgb_array")
 """

@@ -118,7 +118,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _make_absolute(options: argparse.Namespace) -> None:
-    """Makes all paths absolute, in variables too: an ego may change the working directory."""
+    """Makes paths absolute, in variables too: egos may change the working directory."""
     for name, value in vars(options).items():
         if isinstance(value, Path):
             setattr(options, name, value.absolute())

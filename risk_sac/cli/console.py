@@ -36,7 +36,7 @@ Answer: TypeAlias = BaseModel | Sequence[BaseModel | Mapping[str, Any]] | Mappin
 
 
 def print_answer(options: argparse.Namespace, answer: Answer, *texts: RenderableType) -> None:
-    """Prints the answer as one JSON document with `--json`, and the texts otherwise."""
+    """Prints an answer as one JSON document with `--json`, else the texts."""
     if options.json:
         plain = TypeAdapter(Any).dump_python(answer)  # else models keep their own way to write NaN
         console.out(to_json(plain, inf_nan_mode="null").decode(), highlight=False)
@@ -46,7 +46,7 @@ def print_answer(options: argparse.Namespace, answer: Answer, *texts: Renderable
 
 
 def say(text: RenderableType) -> None:
-    """Prints a table, or text that wraps at spaces; a path stays whole, however long it is."""
+    """Prints a table, or text wrapped at spaces; long paths stay whole."""
     if isinstance(text, str):
         lines = (_wrapped(line, console.width) for line in text.splitlines())
         console.print("\n".join(lines), markup=False, soft_wrap=True)
@@ -74,7 +74,7 @@ def number(type_: type[int] | type[float], least: float, most: float = math.inf)
 
 
 def write_out(file: Path, content: bytes, what: str = "", said_on: Output = console) -> None:
-    """Write a file that the user named, with the folders that it lacks, and say so."""
+    """Writes a user's file with missing folders, and says so."""
     file.parent.mkdir(parents=True, exist_ok=True)
     replace_file(file, content)
     if what:
@@ -82,13 +82,13 @@ def write_out(file: Path, content: bytes, what: str = "", said_on: Output = cons
 
 
 def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
-    """Columns around a bar; the field `found`, the search's findings, wraps on narrow terminals."""
+    """Returns columns around a bar; `found`, the findings, wraps on narrow terminals."""
     found = TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
     return TextColumn("{task.description}"), bar, MofNCompleteColumn(), found
 
 
 def progress_bar() -> Progress:
-    """Returns bars with the time that remains; nothing is drawn where standard error is no terminal."""
+    """Returns bars with remaining time; draws nothing without a terminal."""
     return Progress(*columns(BarColumn()), TimeRemainingColumn(), console=notes, disable=not notes.is_terminal)
 
 
@@ -101,7 +101,7 @@ class Board:
         self._tasks: dict[str, TaskID] = {}
 
     def show(self, done: int, total: int, found: str, at_work: Mapping[str, tuple[int, int]]) -> None:
-        """Draw the present state; `at_work` has done and total of each run at work, by its name."""
+        """Draws the state; `at_work` has done and total by run name."""
         self._bar.update(self._all, completed=done, total=total, found=found)
         for name in self._tasks.keys() - at_work.keys():
             self._bar.remove_task(self._tasks.pop(name))
@@ -112,7 +112,7 @@ class Board:
 
 
 def narrow_table(*columns: str, **style: Any) -> Table:
-    """Returns an empty table without lines, of which only the last column wraps."""
+    """Returns an empty table without lines; only the last column wraps."""
     unwrapped = (Column(name, no_wrap=name != columns[-1]) for name in columns)
     return Table(*unwrapped, box=SIMPLE_HEAD, padding=0, **style)
 
@@ -124,7 +124,7 @@ def say_adjustments(found: Iterable[Adjustment]) -> None:
 
 
 def folded_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    """Returns a table that folds all cells but those of the first column."""
+    """Returns a table that folds all cells except the first column's."""
     table = Table(*columns, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.columns[0].no_wrap = True
     for row in rows:
@@ -138,7 +138,7 @@ REQUIREMENT_HEADS = ("requirement", "counts", "vio-\nlated", "valid", "dis-\ntin
 def requirements_table(
     groups: Mapping[str, Mapping[str, RequirementCounts]], said: Mapping[tuple[str, str], str] | None = None
 ) -> Table | None:
-    """A row for each requirement below the name of its group, in 80 columns; None without any.
+    """Returns requirements' rows below their groups, in 80 columns, or None.
 
     Args:
       groups: by name, their requirements.
@@ -170,7 +170,7 @@ EGO = f"{EGO_NAMES}, or {EGO_FILE}"
 
 
 def on_one_line(text: str) -> str:
-    """Returns the text with every run of white space as a single space."""
+    """Returns the text with single spaces for all white space."""
     return " ".join(text.split())
 
 
@@ -180,7 +180,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def headline(found: int | None, candidates: int, published: int | None) -> str:
-    """Formats the number of headline failures; before their replay "at most" the candidates.
+    """Formats the headline count; before replay "at most" the candidates.
 
     `published` are those that R157, FSM or RSS prevents.
     """
@@ -190,12 +190,12 @@ def headline(found: int | None, candidates: int, published: int | None) -> str:
 
 
 def driven_by_in_words(counts: Mapping[str, int]) -> str:
-    """Counts by what drove the adversaries, such as `policy 41, script 137`; a dash where nothing is known."""
+    """Formats counts by `DrivenBy`, as `policy 41, script 137`; dash without any."""
     return ", ".join(f"{each} {counts[each]}" for each in DrivenBy if counts.get(each)) or "-"
 
 
 def offences(violation: Collision | Violation) -> Iterator[str]:
-    """Yields a line of what the ego broke, and one of what the other broke."""
+    """Yields a line of the ego's offences, and one of the other's."""
     if isinstance(violation, Violation):
         broken = {"ego": violation.broke}
     else:

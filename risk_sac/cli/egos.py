@@ -1,4 +1,4 @@
-"""`risk-sac egos`: lists egos and defects, and compares egos under the same search."""
+"""`risk-sac egos`: lists egos and defects; compares egos under one search."""
 
 import argparse
 import os
@@ -164,7 +164,7 @@ def _ladder(options: argparse.Namespace) -> int:
 
 
 def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[str]]:
-    """Returns a row per ego of a family, the worst first; intervals are Wilson's over the pooled episodes."""
+    """Returns a family's rows by ego, worst first; Wilson intervals, pooled episodes."""
     rows: list[tuple[tuple[float, float], list[str]]] = []
     for name, runs in found.items():
         of_family = [run.metrics["search"] for run in runs if run.spec.family == family]

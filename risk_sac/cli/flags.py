@@ -1,4 +1,4 @@
-"""Flags of campaigns, runs, egos, places and lists, and the scenarios that they name."""
+"""Flags of campaigns, runs, egos, places and lists, and named scenarios."""
 
 import argparse
 import re
@@ -45,7 +45,7 @@ BUDGET: Mapping[str, tuple[Callable[[str], object], str, str]] = {
 
 
 def add_campaign_flags(parser: Parser, *, families: str, methods: str, seeds: int) -> None:
-    """Adds the flags of a campaign; the help names the defaults that are given here."""
+    """Adds a campaign's flags; the help names the given defaults."""
     scene, search = parser.group("scene"), parser.group("search")
     named = f"shipped, kept or in a file; `risk-sac scenarios list` (default: {families})"
     scene.add_argument("--scenario", dest="families", nargs="+", metavar="NAME_OR_FILE", help=named)
@@ -62,7 +62,7 @@ def add_campaign_flags(parser: Parser, *, families: str, methods: str, seeds: in
 
 
 def add_budget_flags(parser: Parser) -> None:
-    """Adds the flags of a run's budget, which a campaign gives to each of its runs."""
+    """Adds the flags of one run's budget, also for campaigns' runs."""
     for name, (type_, metavar, what) in BUDGET.items():
         flag = f"--{name.replace('_', '-')}"
         parser.group("budget").add_argument(flag, type=type_, metavar=metavar, help=what)
@@ -105,7 +105,7 @@ def named_ego(text: str) -> EgoConfig:
 
 
 def scene_flags(options: argparse.Namespace) -> dict[str, Any]:
-    """Returns the ego and the behaviour that flags name; None where one is missing."""
+    """Returns the ego and behaviour of flags; None for missing ones."""
     ego = None if options.ego is None else named_ego(options.ego).model_dump(mode="json")
     if options.ego_label is not None:
         if ego is None:
@@ -115,7 +115,7 @@ def scene_flags(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_prior_flag(parser: Parser, earlier: str = "the folder of an earlier run or campaign") -> None:
-    """Adds the flag that says what a search starts from; `earlier` is what else it may name."""
+    """Adds the flag for a search's start; `earlier` is another possible value."""
     what = f"what a search starts from: shipped, none, or {earlier} (default: shipped)"
     parser.group("search").add_argument("--prior", metavar="PRIOR", help=what)
 
@@ -149,7 +149,7 @@ MAP_HELP = "a SUMO net, an OSM extract or OpenDRIVE, also packed"
 
 
 def add_map_flags(parser: Parser, *, several: bool) -> None:
-    """Adds the flags of a place; `several`: all places of a pattern can be asked for."""
+    """Adds a place's flags; `several` allows all places of a pattern."""
     add_place_flags(parser, f"in place of a family: {MAP_HELP}", several=several)
 
 
@@ -164,7 +164,7 @@ def add_place_flags(parser: Parser, what: str, *, several: bool = True) -> None:
 
 
 def families_on_map(options: argparse.Namespace) -> list[str] | None:
-    """Adds the places' families to the library; returns their names, or None if no map was named.
+    """Adds places' families to the library; returns names, None without a map.
 
     Raises:
       ConfigError: the flags do not go together, or the pattern does not fit there.
@@ -203,7 +203,7 @@ def add_limit(parser: Parser) -> None:
 
 
 def kept_name(name_or_file: str) -> str:
-    """Returns the name of a scenario; a document's or an OpenSCENARIO file's is put into the library first.
+    """Returns a scenario's name; documents and OpenSCENARIO files enter the library.
 
     Raises:
       ConfigError: the document has a fault, or there is none.
@@ -235,7 +235,7 @@ def imported_file(file: Path, ego: str | None = None) -> "Imported":
 
 
 def keep_imported(imported: "Imported") -> str:
-    """Puts an imported scenario into the library, once its document is checked; returns its name."""
+    """Checks an imported scenario, adds it to the library, returns its name."""
     with tempfile.TemporaryDirectory() as folder:
         for name, content in imported.files.items():
             Path(folder, name).write_bytes(content)
@@ -247,7 +247,7 @@ def keep_imported(imported: "Imported") -> str:
 
 
 def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
-    """Returns a scenario's document, and the folder of its own nets if it has one.
+    """Returns a scenario's document, and its own nets' folder or None.
 
     Raises:
       ConfigError: there is no such scenario or file, or the document has a fault.
@@ -268,7 +268,7 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
 
 
 def is_file(name_or_file: str) -> bool:
-    """Whether a word names a file: it has a folder or an ending."""
+    """Whether a word names a file: it has a folder or ending."""
     if Path(name_or_file).suffix or "/" in name_or_file:
         if not Path(name_or_file).is_file():
             remedy = "check its path, or name a scenario of `risk-sac scenarios list`"

@@ -1,4 +1,4 @@
-"""`risk-sac benchmark`, `power` and `pretrain`: measures methods, and makes the priors that ship."""
+"""`risk-sac benchmark`, `power`, `pretrain`: measures methods and makes shipped priors."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""Argument parser of all commands: grouped flags, an example in the help, and errors that suggest a name."""
+"""Argument parser of all commands: grouped flags, examples, errors with suggestions."""
 
 import argparse
 import re
@@ -24,14 +24,14 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
-    """Help whose lines break at spaces only, so that names with hyphens stay whole."""
+    """Help whose lines break only at spaces, not within hyphenated names."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser with titled groups of flags, whose errors name the closest known name."""
+    """Parser with titled flag groups; errors name the closest known name."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         options["formatter_class"] = _Help
@@ -39,7 +39,7 @@ class Parser(argparse.ArgumentParser):
         self._titled: dict[str, argparse._ArgumentGroup] = {}
 
     def group(self, title: str) -> "argparse._ArgumentGroup":
-        """Returns the group of flags with a title; adds it the first time."""
+        """Returns the group of flags with a title; adds a new one."""
         if title not in self._titled:
             self._titled[title] = self.add_argument_group(title)
         return self._titled[title]
@@ -49,7 +49,7 @@ class Parser(argparse.ArgumentParser):
         return re.findall(rf"(?<![\w-]){FLAG.pattern}", self.format_usage())
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Overrides argparse: a command refuses an unknown flag before it names a missing one."""
+        """Overrides argparse: an unknown flag is refused before a missing one."""
         words = list(sys.argv[1:] if args is None else args)
         if self.get_default("command") is not None and "-" in self.prefix_chars:  # `keys` passes its words on
             taken = words[: words.index("--")] if "--" in words else words
@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
         self.error(f"there is no flag {name}" + _sentence(hint))
 
     def error(self, message: str) -> NoReturn:
-        """Ends the program with one line on what is wrong, and where to read on."""
+        """Ends the program with a line on the error and a hint."""
         complain(f"{self.prog}: {message.removeprefix('argument ')}\n`{self.prog} --help` lists what it takes.")
         raise SystemExit(MISUSED)
 
@@ -113,13 +113,13 @@ def add_command(
 
 
 def add_group(commands: Commands, name: str, summary: str, *, example: str, more: str = "", epilog: str = "") -> Parser:
-    """Adds a command that has commands of its own; the arguments are those of `add_command`."""
+    """Adds a command with subcommands; arguments are those of `add_command`."""
     paragraph = textwrap.fill(f"{summary[0].upper()}{summary[1:]}. {more}".strip(), WIDTH)
     return commands.add_parser(name, help=summary, description=paragraph, epilog=example_text(example, epilog))
 
 
 def example_text(example: str, epilog: str = "") -> str:
-    """Returns the end of a help text: the example and what follows it."""
+    """Returns a help text's end: the example and what follows it."""
     line = f"risk-sac {example}"
     lines = [line]
     if len(line) > WIDTH - 2:

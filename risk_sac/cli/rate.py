@@ -1,4 +1,4 @@
-"""`risk-sac rate` and `boundary`: how often, and where, an ego fails in a scenario without an attack."""
+"""`risk-sac rate` and `boundary`: how often and where an ego fails, unattacked."""
 
 import argparse
 from pathlib import Path

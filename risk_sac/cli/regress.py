@@ -1,4 +1,4 @@
-"""`risk-sac regress`: plays old failures against another ego and writes a JUnit report."""
+"""`risk-sac regress`: replays failures against another ego; writes a JUnit report."""
 
 import argparse
 from collections.abc import Iterator
@@ -103,7 +103,7 @@ def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) ->
 
 
 def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
-    """Plays the failures of files and runs; reads all of them before it plays the first."""
+    """Plays failures of files and runs; reads all before the first play."""
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
     from risk_sac.failures.regress import regress, regress_run
 
@@ -134,7 +134,7 @@ FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)
 
 
 def junit(regression: Regression) -> bytes:
-    """The report: fixed passes, known is skipped; what is flaky or cannot be compared is an error."""
+    """Returns JUnit: fixed passes, known is skipped, flaky or incomparable is error."""
     suite = TestSuite("regression")
     suite.add_property("ego", regression.ego.model_dump_json())
     suite.add_testcases([_case(case) for case in regression.cases])

@@ -332,7 +332,7 @@ def _region(options: argparse.Namespace) -> int:
 
 
 def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
-    """The failures of a run with their ids; flaky ones and their like are refused."""
+    """Yields a run's failures with ids; refuses kinds that did not repeat."""
     results = read_results(path)
     verified = read_verified(path if path.is_dir() else path.parent, results.digest or "")
     episodes = [failure.episode for failure in results.failures]

@@ -249,7 +249,7 @@ def _trend(options: argparse.Namespace) -> int:
 
 
 def trend_of_folders(folders: Sequence[Path]) -> Trend:
-    """Compares the versions of each ego by the campaigns in folders, oldest first.
+    """Compares each ego's versions by campaigns in folders, oldest first.
 
     Raises:
       ConfigError: a folder has no run, or the campaigns are of different scenarios.

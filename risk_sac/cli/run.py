@@ -1,4 +1,4 @@
-"""`risk-sac run` and `evaluate`: one run, or a comparison of methods over seeds, without a server."""
+"""`risk-sac run` and `evaluate`: a run, or compared methods, without server."""
 
 import argparse
 import os

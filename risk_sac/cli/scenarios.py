@@ -1,4 +1,4 @@
-"""`risk-sac scenarios` and `places`: works on scenario documents, and lists where patterns fit on a map."""
+"""`risk-sac scenarios` and `places`: handles scenario documents, lists patterns on maps."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""`risk-sac show`: lists and draws the failures of a run; flags that choose failures."""
+"""`risk-sac show`: lists and draws a run's failures; flags that choose failures."""
 
 import argparse
 import textwrap
@@ -105,7 +105,7 @@ def _bundled(file: Path) -> tuple[RunSpec, Recording]:
 
 
 def _draw(options: argparse.Namespace, spec: RunSpec, recording: Recording, file: Path) -> int:
-    """Draws a failure; without `--out` beside the file that its series is from."""
+    """Draws a failure, by default beside the file of its series."""
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
     twin = None
@@ -131,7 +131,7 @@ def _names_failure(path: Path) -> bool:
 
 
 def newest_run(folder: Path) -> Path:
-    """Returns the folder of a run below `folder` that was written last, at most three levels down.
+    """Returns the newest run's folder at most three levels below `folder`.
 
     Raises:
       ConfigError: there is none.
@@ -176,7 +176,7 @@ def _plain(failure: RecordedFailure) -> dict[str, Any]:
 
 
 def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
-    """Returns a table of failures by number, under the id of their run.
+    """Returns a run's table of failures by number, titled by its id.
 
     Fits 80 columns; only the last one wraps.
     """
@@ -214,7 +214,7 @@ def _of_contact(collision: Collision) -> tuple[str, ...]:
 
 
 def _without_contact(violation: Violation) -> tuple[str, ...]:
-    """Returns the same cells of a violation without contact, which has no zones."""
+    """Returns the cells of a violation without contact, without zones."""
     name = textwrap.fill(violation.requirement, NAME_WIDTH)
     return f"{violation.ego_speed_mps:.1f}", "", f"{name}\n{violation.time_s:.1f}"
 
@@ -319,7 +319,7 @@ def matching(options: argparse.Namespace, failures: Iterable[E]) -> Iterator[E]:
 
 
 def listed(options: argparse.Namespace, failures: Iterable[E], family: FamilyName | None = None) -> list[E]:
-    """Returns the failures to list, and notes on standard error if --limit leaves some out.
+    """Returns the failures to list; notes if --limit leaves some out.
 
     Args:
       options: of the command line.

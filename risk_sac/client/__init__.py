@@ -1,4 +1,4 @@
-"""A client of the service: HTTP alone, without the method and without the simulator.
+"""HTTP client of the service, without the method and the simulator.
 
 from risk_sac.client import Client
 

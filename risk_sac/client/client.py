@@ -68,7 +68,7 @@ class NetworkNames(Page[NetworkName]):
 
 
 class Client:
-    """Posts campaigns, follows them and reads what they found; may be shared by threads.
+    """Client of campaigns and their results; threads may share it.
 
     Every method raises a `ClientError`: `Refused` with the service's reason, `Unreachable`, or `UnexpectedAnswer`. What
     may pass by itself (a connection refused or broken, 429, 502, 503, 504) is asked again where that can do no harm.
@@ -142,7 +142,7 @@ class Client:
         tag: str | None = None,
         page: int = PAGE,
     ) -> Iterator[CampaignSummary]:
-        """Campaigns, newest first; read page by page as far as they are asked for."""
+        """Yields campaigns, newest first, and reads further pages as needed."""
         query: Query = {"state": state, "family": family, "method": method, "label": label, "tag": tag}
         return self._items(CampaignPage, "v1/campaigns", query | {"limit": page})
 
@@ -164,7 +164,7 @@ class Client:
         return self._get(ScenarioDetails, f"v1/scenarios/{_part(name)}")
 
     def add_scenario(self, document: Scenario, nets: Mapping[str, bytes] = {}) -> ScenarioDetails:
-        """Keeps a scenario, for campaigns to name; the same again gives the one that there is.
+        """Stores a scenario for campaigns to name; returns an equal stored one.
 
         Args:
           document: of the scenario.
@@ -196,11 +196,11 @@ class Client:
         return self._get(Results, f"{_path(campaign_id)}/results")
 
     def boundary(self, campaign_id: str, run_id: str) -> BoundaryMap:
-        """Returns where a run of the method `boundary` goes from passing to failing."""
+        """Returns a `boundary` run's map from passing to failing."""
         return self._get(BoundaryMap, f"{_path(campaign_id)}/runs/{_part(run_id)}/boundary")
 
     def power(self, campaign_id: str) -> Power:
-        """Number of known defects that the budget of a campaign detects, by stored benchmark runs."""
+        """Returns how many known defects the budget detects, by stored benchmark runs."""
         return self._get(Power, f"{_path(campaign_id)}/power")
 
     def failures(
@@ -220,7 +220,7 @@ class Client:
         order: FailureOrder = "arrival",
         page: int = PAGE,
     ) -> Iterator[Episode]:
-        """Failures in an order; read page by page as far as they are asked for."""
+        """Yields failures in an order, and reads further pages as needed."""
         query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
         query |= {"plausibility": plausibility, "severity": severity, "fault": fault, "driven_by": driven_by}
         query |= {"kind": kind, "order": order, "limit": page}
@@ -241,17 +241,17 @@ class Client:
         return self._made(campaign_id, failure_id, "picture.png" if twin is None else f"twins/{_part(twin)}.png", PNG)
 
     def export(self, campaign_id: str, failure_id: str, format_: str) -> bytes:
-        """Returns one failure in a format of other tools, such as "openscenario"; several files come as a zip."""
+        """Exports a failure in a format ("openscenario"); several files as a zip."""
         path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/export"
         return self._transport.ask("GET", path, query={"format": format_}, patience_s=MAKING_S).content
 
     def bundle(self, campaign_id: str, failure_id: str, *, aim: Aim | None = None) -> bytes:
-        """One failure in a file that stands alone, or minimised, which takes some 10 or 20 seconds."""
+        """Returns a self-contained file of a failure; minimising (`aim`) takes 10-20 s."""
         names = {None: "bundle.npz", "smallest": "core.npz", "most-plausible": "most-plausible.npz"}
         return self._made(campaign_id, failure_id, names[aim], BUNDLE)
 
     def regress(self, campaign_id: str, ego: EgoConfig) -> CampaignRegression:
-        """Plays the distinct failures of a campaign against another ego, or returns an earlier equal regression."""
+        """Plays a campaign's distinct failures against another ego; reuses an equal regression."""
         body = json.dumps({"campaign_id": campaign_id, "ego": ego.model_dump(mode="json", exclude_unset=True)})
         return read(CampaignRegression, self._transport.ask("POST", "v1/regressions", body=body))
 
@@ -281,12 +281,12 @@ class Client:
     def report(
         self, campaign_id: str, format_: Literal["json", "md", "html"] = "md", regression_id: str | None = None
     ) -> str:
-        """Returns the report of a campaign; JSON has bounds and coverage alone, without a regression."""
+        """Returns a campaign's report; JSON has only bounds and coverage, no regression."""
         query = {"format": format_, "regression": regression_id}
         return self._transport.ask("GET", f"{_path(campaign_id)}/report", query=query).text
 
     def cancel(self, campaign_id: str) -> Campaign:
-        """Stops a campaign, which takes a while, and keeps what it found; changes nothing once it has ended."""
+        """Cancels a campaign, keeping results; takes a while, no-op once ended."""
         return read(Campaign, self._transport.ask("POST", f"{_path(campaign_id)}/cancel"))
 
     def delete(self, campaign_id: str) -> None:
@@ -294,7 +294,7 @@ class Client:
         self._transport.ask("DELETE", _path(campaign_id), repeatable=False)
 
     def events(self, campaign_id: str, last_event_id: str | None = None, *, away_s: float = AWAY_S) -> Iterator[Event]:
-        """Yields finished episodes, failures and changes of state until the campaign has ended.
+        """Yields finished episodes, failures and state changes until the campaign ends.
 
         A stream that breaks continues after the last event that arrived.
 
@@ -306,7 +306,7 @@ class Client:
         return events(self._transport, _path(campaign_id), last_event_id, away_s)
 
     def follow(self, campaign_id: str, *, timeout_s: float | None = None, away_s: float = AWAY_S) -> Iterator[Campaign]:
-        """Yields the campaign now, and whenever it has changed, until it has ended.
+        """Yields the campaign now and after each change, until it ends.
 
         Args:
           campaign_id: of the campaign.
@@ -323,7 +323,7 @@ class Client:
         timeout_s: float | None = None,
         away_s: float = AWAY_S,
     ) -> Campaign:
-        """The campaign once it has ended; `on_change` sees it before, whenever it has changed."""
+        """Returns the ended campaign; calls `on_change` with each state before."""
         for campaign in self.follow(campaign_id, timeout_s=timeout_s, away_s=away_s):
             if on_change is not None:
                 on_change(campaign)
@@ -346,5 +346,5 @@ def _path(campaign_id: str) -> str:
 
 
 def _part(id_: str) -> str:
-    """One part of a path: a slash or a question mark in the id leads nowhere else."""
+    """Quotes an id as one part of a path, including slashes."""
     return quote(id_, safe="", errors="replace")

@@ -1,4 +1,4 @@
-"""HTTP transport of the client, its errors, and how a campaign is followed."""
+"""HTTP transport of the client, its errors, and following a campaign."""
 
 import json
 import logging
@@ -40,7 +40,7 @@ class Unreachable(ClientError):
 
 
 class StreamLost(Unreachable):
-    """The stream of events broke after it had begun; it continues after the last event that arrived."""
+    """A stream of events that broke; it resumes after the last event."""
 
 
 class _Problem(BaseModel):
@@ -50,7 +50,7 @@ class _Problem(BaseModel):
 
 
 class Refused(ClientError):
-    """The service answered with a problem; of a proxy's own page only the status is known."""
+    """A problem that the service answered; from a proxy only a status."""
 
     def __init__(self, response: httpx.Response, *, passing: bool) -> None:
         try:
@@ -78,11 +78,11 @@ class UnexpectedAnswer(ClientError):
 
 
 class Overdue(ClientError):
-    """The campaign did not end within the time that the caller gave it; it goes on."""
+    """A campaign that outlasts the caller's timeout; it continues."""
 
 
 def retry_after_s(response: httpx.Response) -> float | None:
-    """Returns the seconds of a Retry-After header, a number or a date; None without a valid one."""
+    """Returns a Retry-After header's seconds (number or date); None if invalid."""
     value = response.headers.get("retry-after", "")
     try:
         seconds = float(value)
@@ -116,7 +116,7 @@ def checked_url(url: str) -> str:
 
 
 def api_key(environment: Mapping[str, str]) -> str | None:
-    """The key in RISK_SAC_API_KEY, or in the file that RISK_SAC_API_KEY_FILE names; None where there is neither.
+    """Returns the key of RISK_SAC_API_KEY or of RISK_SAC_API_KEY_FILE's file, or None.
 
     Raises:
       ConfigError: the file cannot be read.
@@ -150,7 +150,7 @@ NEVER_SENT = (httpx.ConnectError, httpx.ConnectTimeout)
 
 
 def read(type_: type[R], response: httpx.Response) -> R:
-    """The record in an answer; fields that this version does not know are no error."""
+    """Reads the record of an answer; unknown fields are allowed."""
     try:
         return type_.model_validate_json(response.content, extra="allow")
     except ValidationError as error:

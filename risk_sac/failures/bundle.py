@@ -36,7 +36,7 @@ SCENARIO = "scenario/"  # names of the arrays with a scenario's files begin so
 
 
 def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
-    """Returns the arrays of a kept scenario, its document and nets; none for a shipped one."""
+    """Returns a kept scenario's document and nets as arrays; empty if shipped."""
     if family in shipped_names():
         return {}
     files = library.files_of(family)
@@ -44,7 +44,7 @@ def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
 
 
 def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> None:
-    """Moves a bundle's scenario into this machine's library; raises `ValueError` if the arrays are none."""
+    """Moves a bundle's scenario into this machine's library; raises `ValueError` if unplayable."""
     names = [name for name in arrays if name.startswith(SCENARIO)]
     files = {name.removeprefix(SCENARIO): arrays.pop(name).tobytes() for name in names}
     if not files or family in shipped_names():
@@ -87,7 +87,7 @@ class Manifest(Record):
 
     @property
     def name(self) -> str:
-        """Its id with a digest of what was played: unique beyond its run."""
+        """Its id with a digest of what was played: unique across runs."""
         return f"{self.id}-{self.key}"
 
     @property
@@ -115,7 +115,7 @@ def make_bundle(
     policy: FrozenPolicy | None,
     core: Core | None = None,
 ) -> Bundle:
-    """Returns a bundle of what was just played here; a policy that is too large is left out."""
+    """Bundles a failure just played, without a policy that is too large."""
     if policy is not None and sum(layer.nbytes for layer in policy.layers) > MOST_POLICY_BYTES:
         policy = None
     manifest = Manifest(
@@ -133,7 +133,7 @@ def make_bundle(
 
 
 def versions() -> dict[str, str]:
-    """Returns the installed versions of the packages that decide how an episode goes."""
+    """Returns installed versions of the packages that affect an episode."""
     return {name: version(name) for name in PACKAGES}
 
 
@@ -146,7 +146,7 @@ def code_digest() -> str:
 
 
 def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
-    """Returns the SHA-256 of the files that SUMO reads for an episode; a ConfigError if one is gone."""
+    """Returns SHA-256 of SUMO's files for an episode; `ConfigError` if gone."""
     net = Problem.from_spec(spec).family.layout(episode.scene).net
     digests = {}
     for name in (net, "vtypes.add.xml"):
@@ -165,7 +165,7 @@ def _portable(name: str, spec: RunSpec) -> str:
 
 
 def bundle_bytes(bundle: Bundle) -> bytes:
-    """Returns the content of a bundle's file; a ConfigError if its scenario is gone."""
+    """Returns the content of a bundle's file; `ConfigError` without its scenario."""
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
     arrays |= carried(bundle.manifest.spec.family)
@@ -180,7 +180,7 @@ def bundle_bytes(bundle: Bundle) -> bytes:
 
 
 def check_world(manifest: Manifest) -> None:
-    """Raises a ConfigError for a failure that was found on another net, or with other vehicle types."""
+    """Raises a `ConfigError` if net or vehicle types differ from the failure's."""
     for name, digest in world_of(manifest.spec, manifest.episode).items():
         if manifest.world.get(name) != digest:
             raise ConfigError("BUNDLE", f"{manifest.id} was found on another {name}, so it cannot be replayed")
@@ -236,7 +236,7 @@ def _bundle(content: bytes, *, inner: bool = False) -> Bundle:
 
 
 def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> None:
-    """Refuses what no run could have recorded, before anything of it reaches the simulator."""
+    """Refuses what no run could have recorded, before the simulator reads it."""
     episode = manifest.episode
     problem.space.check(Scene(problem.family.name, episode.scene))
     if episode.seed < 0:

@@ -41,7 +41,7 @@ def canvas(size_in: tuple[float, float]) -> Figure:
 
 
 def picture(draw: Callable[[], Figure], formats: Sequence[str], dpi: float, style: dict[Any, Any]) -> list[bytes]:
-    """A figure as a file of each format; the same figure gives the same bytes.
+    """Returns a figure's file in each format; equal figures give equal bytes.
 
     Args:
       draw: makes the figure; in the style, and while nothing else is drawn.
@@ -71,7 +71,7 @@ HALO = [withStroke(linewidth=2, foreground="white")]
 
 @dataclass
 class Labels:
-    """Labels of one view; a box is its lower left and its upper right corner, m."""
+    """Labels of one view; a box is two opposite corners, m."""
 
     axis: Axes
     low: Floats  # corners of the view, m
@@ -84,7 +84,7 @@ class Labels:
         self._taken.append((corners.min(axis=0), corners.max(axis=0)))
 
     def write(self, text: str, body: Floats, ways: Iterable[Floats], size_pt: float, colour: str) -> None:
-        """Writes beside a body, on the first side with room; writes nothing without any, or out of view.
+        """Writes beside a visible body, on the first side with room.
 
         Args:
           text: one line.
@@ -177,7 +177,7 @@ def draw_from_above(
 
 
 def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float]]:
-    """Groups the recorded times of `GHOSTS_S` in which the body was in about the same place."""
+    """Groups times of `GHOSTS_S` at which the body is almost unmoved."""
     groups: list[list[float]] = []
     for before_s in GHOSTS_S:
         if -before_s < recording.time_s[0]:
@@ -231,7 +231,7 @@ def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
 
 
 def _label_body(labels: Labels, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
-    """Writes the times beside a body, first on the side that faces away from the other body."""
+    """Writes the times beside a body, first away from the other body."""
     x, y, heading = recording.pose(actor, -times_s[0])
     partner_x, partner_y, _ = recording.pose((recording.other or 0) if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))
@@ -249,7 +249,7 @@ def _draw_contact_point(axis: Axes, recording: Recording, collision: Collision) 
 
 
 def _draw_conflict(axis: Axes, recording: Recording) -> None:
-    """Draws both bodies when the conflict began, and where the striker was then."""
+    """Draws both bodies and the striker's place as the conflict began."""
     begin_s = recording.conflict_s
     if recording.collision is None or begin_s is None:
         return

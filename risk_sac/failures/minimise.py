@@ -1,4 +1,4 @@
-"""Minimises a failure: fewest actions and plainest scene, or least unlikely motion, and the same failure.
+"""Minimises a failure: fewest actions and plainest scene, or least unlikely motion.
 
 Source: delta debugging, Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input" (IEEE TSE 28, 2002).
 """
@@ -58,7 +58,7 @@ class _MinimalSearch:
 
     @property
     def neutral(self) -> Floats:
-        """The middle of the space; parameters that stand for one of two categories stay."""
+        """The middle of the space; categorical parameters keep their values."""
         space = self.stage.space
         return np.where(self._categories, self.left.scene, (space.low + space.high) / 2)
 
@@ -77,7 +77,7 @@ class _MinimalSearch:
         return True
 
     def _holds(self, variant: Variant) -> bool:
-        """Whether enough of its copies fail; played no further than it takes to know."""
+        """Whether enough copies fail; plays no more than needed to know."""
         failed = 0
         for played, copy in enumerate(self.stage.copies(variant, SHARE, COPIES, self._random), 1):
             failed += self.stage.fails(copy)
@@ -105,7 +105,7 @@ class _MinimalSearch:
 
 
 def _result(stage: VariantPlayer, variant: Variant, random: np.random.Generator) -> tuple[int, Played, str]:
-    """Counts the copies that fail, others than those it was chosen by, and plays the variant once more."""
+    """Counts failing copies, newly drawn, and plays the variant once more."""
     held = sum(stage.fails(copy) for copy in stage.copies(variant, SHARE, COPIES, random))
     played = play(stage.env, stage.scene(variant), variant.seed, variant.actions)
     violation = alike(played.found, stage.failure)
@@ -121,7 +121,7 @@ def _active_adversaries(search: _MinimalSearch) -> list[int]:
 
 
 def _units(search: _MinimalSearch) -> Iterator[list[Cell]]:
-    """Yields candidates for removal, the coarsest first, each group from the actions that remain by then."""
+    """Yields groups to remove, coarsest first, of the actions that remain."""
     always = slice(None)
     yield [(always, _columns(k)) for k in _active_adversaries(search)]
     yield [(always, slice(c, c + 1)) for c in np.flatnonzero(search.left.actions.any(axis=0)).tolist()]
@@ -130,7 +130,7 @@ def _units(search: _MinimalSearch) -> Iterator[list[Cell]]:
 
 
 def _reduce_actions(search: _MinimalSearch) -> None:
-    """Hands adversaries over to SUMO: whole ones, their drive or steering, segments; then weakens the rest."""
+    """Hands adversaries, channels or segments to SUMO, then weakens the rest."""
     for units in _units(search):
         without(units, lambda cells: search.take(_zeroed(search.left, cells)))
     while search.left.actions.any() and any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
@@ -138,7 +138,7 @@ def _reduce_actions(search: _MinimalSearch) -> None:
 
 
 def _reduce_scene(search: _MinimalSearch) -> None:
-    """Moves parameters to the middle of their ranges, and those that cannot be moved there half the way."""
+    """Moves parameters to the middle of their ranges, or half way."""
 
     def unneeded(share: float, chunk: Sequence[int]) -> bool:
         scene = search.left.scene.copy()
@@ -152,7 +152,7 @@ def _reduce_scene(search: _MinimalSearch) -> None:
 
 
 def without(units: Sequence[Unit], unneeded: Callable[[Sequence[Unit]], bool]) -> None:
-    """Tries to remove all units, then halves, quarters and so on, then each.
+    """Tries to remove all units, then halves, quarters, down to single ones.
 
     `unneeded` tries to do without some from now on, and returns whether that is possible.
     """
@@ -183,7 +183,7 @@ def _columns(adversary: int) -> slice:
 
 
 def _channels_of(variant: Variant) -> list[tuple[int, int]]:
-    """Returns the columns and segments in which something is done, the earliest first."""
+    """Returns the columns and segments with actions, the earliest first."""
     count = -(-len(variant.actions) // SEGMENT)
     columns = range(variant.actions.shape[1])
     return [(c, s) for s in range(count) for c in columns if variant.actions[_rows(s), c].any()]
@@ -216,7 +216,7 @@ FACTORS = (0.3, 1.2)  # by which actions are weakened or strengthened
 
 
 def unlikely(evidence: Evidence) -> float:
-    """Computes -log p of the least likely feature and of all together, nats.
+    """Computes -log p of the least likely feature and of all, nats.
 
     Choice: their sum, since either decides the class, and the larger one alone hides what a change gains in the other.
     """
@@ -225,7 +225,7 @@ def unlikely(evidence: Evidence) -> float:
 
 
 def most_plausible(bundle: Bundle, score: Unlikely = unlikely, most: int = MOST_MOTIONS) -> Bundle:
-    """Returns the least unlikely motion that was found, as a bundle that keeps the recording too.
+    """Returns the least unlikely motion found, in a bundle with the recording.
 
     It climbs over the recorded actions. A change makes one adversary's drive or steering smoother, constant, weaker,
     absent, earlier or later over a while, or moves it. It is kept if it lowers the unlikeliness and the ego fails
@@ -280,7 +280,7 @@ class _Climb:
 
 
 def changed(actions: Floats, random: np.random.Generator) -> Floats:
-    """Returns actions, `T x a` in [-1, 1], of which one column differs over a while."""
+    """Changes one column of actions, `T x a` in [-1, 1], temporarily."""
     acting = np.flatnonzero(actions.any(axis=0))
     if not len(acting):
         return actions

@@ -1,4 +1,4 @@
-"""Surfaces and signal heads of a net, and a failure on them as a small SVG from above.
+"""Surfaces and signal heads of a net, and failures as SVG thumbnails.
 
 The SVG is written by hand, because a screen shows dozens of them and matplotlib takes a second for each.
 """
@@ -42,12 +42,12 @@ def colour(letter: str) -> str:
 
 
 def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
-    """Returns the left and the right edge of a lane, `k x 2` each."""
+    """Returns a lane's left and right edge, `k x 2` each."""
     return moved(centre, width_m / 2), moved(centre, -width_m / 2)
 
 
 def moved(centre: Floats, left_m: float) -> Floats:
-    """Returns a line, `k x 2`, moved to the left, mitred where its sides meet."""
+    """Moves a line, `k x 2`, to the left, mitred at corners."""
     sides = np.diff(centre, axis=0)
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)
     normals = np.column_stack((-sides[:, 1], sides[:, 0]))
@@ -59,7 +59,7 @@ def moved(centre: Floats, left_m: float) -> Floats:
 
 
 def ribbon(centre: Floats, width_m: float) -> Floats:
-    """Returns the outline of a lane, `2k x 2`: its left edge, and its right edge back."""
+    """Returns a lane's outline, `2k x 2`: left edge, reversed right edge."""
     left, right = boundaries(centre, width_m)
     return np.concatenate((left, right[::-1]))
 
@@ -82,7 +82,7 @@ def shipped_surfaces(name: str) -> Sequence[Surface]:
 
 
 def surfaces(net: Net) -> Sequence[Surface]:
-    """Returns the surfaces of a net, junctions first so that lanes are drawn over them.
+    """Returns a net's surfaces, junctions first: lanes are drawn over them.
 
     Lanes inside junctions overlap each other and are left out: the junction's own outline stands for them. A lane that
     is closed to cars is shown as a sidewalk.
@@ -110,7 +110,7 @@ LAMPS: Mapping[SignalColour, str] = {"red": "#e5484d", "yellow": "#f5b700", "gre
 
 @dataclass(frozen=True, slots=True)
 class SignalHead:
-    """The signal at the end of a lane, or at one end of a crossing."""
+    """The signal at a lane's end, or at a crossing's end."""
 
     x_m: float
     y_m: float
@@ -147,7 +147,7 @@ def signal_heads(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Sig
 
 
 def _places(lane: NetLane) -> list[tuple[float, float, float]]:
-    """Returns x, y and heading at the end of a lane; a crossing is entered from both sides."""
+    """Returns poses at a lane's end, or at both ends of crossings."""
     ends = [(lane.centre[-1], lane.centre[-1] - lane.centre[-2])]
     if lane.use == "crossing":
         ends.append((lane.centre[0], lane.centre[0] - lane.centre[1]))
@@ -155,7 +155,7 @@ def _places(lane: NetLane) -> list[tuple[float, float, float]]:
 
 
 def _changes(program: Program, head: Head, offset_s: float) -> Changes:
-    """Returns when a link's colour changes, from the cycle that runs at the start."""
+    """Returns a link's colour changes from the cycle running at the start."""
     changes: list[tuple[float, SignalColour]] = []
     time_s = -((offset_s - program.offset_s) % program.cycle_s)
     while time_s < SHOWN_S:
@@ -176,7 +176,7 @@ class SurfaceBody(Record):
 
 
 class SignalHeadBody(Record):
-    """The signal at the end of a lane, or at one end of a crossing."""
+    """The signal at a lane's end, or at a crossing's end."""
 
     x_m: float
     y_m: float
@@ -240,7 +240,7 @@ def thumbnail(recording: Recording, roads: Sequence[Surface], signals: Sequence[
 
 
 class _View:
-    """Visible piece of ground: the end of both paths, in the middle if all of it fits."""
+    """Visible ground: the end of both paths, in the middle if possible."""
 
     def __init__(self, recording: Recording) -> None:
         paths = np.concatenate([_path(recording, actor) for actor in recording.involved])
@@ -262,7 +262,7 @@ class _View:
 
 
 def _path(recording: Recording, actor: int) -> Floats:
-    """Returns an actor's last places, `k x 2`, m, without frames in which it was absent."""
+    """Returns an actor's last places, `k x 2`, m, without absent frames."""
     places = np.column_stack((recording["x_m"][:, actor], recording["y_m"][:, actor]))
     shown = (recording.time_s >= -VIEW_S) & (recording.time_s < STEP_S)
     return places[shown & np.isfinite(places).all(axis=1)]
@@ -280,7 +280,7 @@ def _ground(view: _View, surface: Surface) -> Iterator[str]:
 
 
 def _signal(view: _View, head: SignalHead, time_s: float) -> Iterator[str]:
-    """Draws a bar across the lane; a green one leaves its middle open."""
+    """Draws a bar across the lane, for green with an open middle."""
     for mark in head.marks(time_s):
         yield _line(view(mark), LAMPS[head.colour(time_s)], 2.6, "")
 
@@ -298,7 +298,7 @@ def _actor(view: _View, recording: Recording, actor: int, colour: str) -> Iterat
 
 
 def _body(view: _View, recording: Recording, actor: int, style: str) -> Iterator[str]:
-    """Draws a body at the violation, that of a vehicle with an arrow head to the front."""
+    """Draws a body at the violation, with an arrow head on vehicles."""
     pose, size = recording.pose(actor, 0.0), (recording["length_m"][actor], recording["width_m"][actor])
     if not np.isfinite(pose).all():
         return

@@ -1,4 +1,4 @@
-"""Plays failures again, as recorded or as twins with one change, and tells which detect a defect.
+"""Plays failures again, or as changed twins; tells which detect a defect.
 
 `python -m risk_sac.failures.play FILE TIMES JOBS FOLDER...` replays the first failures of each variant `TIMES` over,
 each time in a process of its own, `JOBS` of them at once. Each appends a line of JSON for each run to the file. They
@@ -37,7 +37,7 @@ Policy = Callable[[Vector], Vector]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Played:
-    """A played episode, up to a contact or to the end of its actions."""
+    """A played episode, up to a contact or its actions' end."""
 
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
@@ -54,7 +54,7 @@ class Played:
         return (*(() if self.collision is None else (self.collision,)), *self.violations)
 
     def record(self, episode: EpisodeRecord) -> EpisodeRecord:
-        """The record of an episode that went like this and was not trained on, otherwise as another one's."""
+        """Returns this play's record, untrained; other fields are those of `episode`."""
         since_release = slice(-len(self.signal_heads), None)
         changes = {
             **Ending.of(self.collision, self.violations)._asdict(),
@@ -118,7 +118,7 @@ def replay(env: RiskSacEnv, episode: EpisodeRecord, recorded: Series) -> Played:
 
 
 def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
-    """Plays a failure again; a SimulationError if it is not the same to the bit."""
+    """Plays a failure again; `SimulationError` unless equal to the last bit."""
     played = replay(env, episode, recorded)
     if trajectory_digest(played.series) != trajectory_digest(recorded):
         raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
@@ -126,14 +126,14 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
 
 
 def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
-    """Plays a recorded failure's twin, which bears the other ego's name, to be drawn beside it."""
+    """Plays a recorded failure's twin, labelled with the other ego's name."""
     played = twin(spec, recording.failure.episode, actions_of(recording.series), changed)
     told = TwinPlay.of(changed, recording.violation, played.found, name)
     return replace(recording, series=played.series, twin=told.title)
 
 
 def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:
-    """Plays a failure's episode, with its actions since the release, with another ego.
+    """Plays an episode's actions with another ego; None means without an attack.
 
     Without another ego there is no attack: adversaries are left to SUMO, and pedestrians stand.
 
@@ -156,7 +156,7 @@ Prepared = Mapping[Path, tuple[RunResults, RiskSacEnv]]
 
 
 def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
-    """Opens the runs that can be played here; for each other run a line states why not."""
+    """Opens the playable runs; a line per other run states why."""
     prepared = {}
     for folder in folders:
         results = read_results(folder)
@@ -168,7 +168,7 @@ def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
 
 
 def _say(file: Path, *lines: dict[str, object]) -> None:
-    """Appends lines in one write, since several processes share the file and any may be killed."""
+    """Appends lines in one write, since sharing processes may be killed."""
     with file.open("ab", buffering=0) as output:
         output.write("".join(f"{json.dumps(line)}\n" for line in lines).encode())
 
@@ -194,7 +194,7 @@ def _repeats(folder: Path, episode: EpisodeRecord, env: RiskSacEnv) -> bool:
 
 
 def _main(file: Path, times: int, jobs: int, folders: list[Path]) -> int:
-    """The greatest exit status of the processes; one that was killed is replaced, up to `ATTEMPTS` times."""
+    """Returns the greatest exit status; replaces killed processes up to `ATTEMPTS` times."""
     runs = _prepared(file, folders)
     soft_min(np.zeros(1), 1.0)  # the first call of any compiled function loads what all of them need
     fork, statuses = multiprocessing.get_context("fork"), [0]
@@ -219,13 +219,13 @@ ROWS = 11  # of a frame's state
 
 
 def candidates(episode: EpisodeRecord) -> list[Collision | Violation]:
-    """Returns the contacts of an episode that may show its ego's defects: plausible, preventable and not minor."""
+    """Returns contacts that may show defects: plausible, preventable and not minor."""
     contacts = [violation for violation in episode.valid_violations if violation.requirement == NO_CONTACT]
     return [contact for contact in contacts if contact.serious and contact.plausible]
 
 
 def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision | Violation | None:
-    """Returns the failure of an episode that detects its ego's defects; None without one.
+    """Returns the episode's failure that detects its ego's defects, or None.
 
     It is one of `candidates`, and a defect changed a command before the contact. The same ego without its defects
     keeps `MARGIN_M` when the adversaries repeat their recorded motions, see `least_clearance_m`. Then it has no valid
@@ -249,14 +249,14 @@ def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision
 
 
 def _reached(spec: RunSpec, episode: EpisodeRecord, failure: Collision | Violation) -> bool:
-    """Whether a defect changed a command before a failure; not known of SUMO's driver, whose defects are settings."""
+    """Whether a defect changed an earlier command; assumed of SUMO's driver."""
     if spec.ego.driver is None:
         return True
     return episode.defect_reached_s is not None and episode.defect_reached_s < failure.time_s
 
 
 def without_defects(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Played:
-    """Plays the recorded motions of an episode against its ego without the defects, and `AFTER_S` without an attack.
+    """Plays an episode's motions against its ego without defects, then `AFTER_S` unattacked.
 
     Raises:
       InfeasibleScene: without the defects, traffic is in danger when the adversaries are released.
@@ -272,7 +272,7 @@ def without_defects(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Pl
 
 
 def least_clearance_m(series: Series) -> float:
-    """Computes the least gap of an ego to bodies ahead of it or beside it, m.
+    """Computes the ego's least gap to bodies ahead or beside, m.
 
     It counts from the release on. A body behind the ego's rear does not count. Nor does one that stays within
     `MARGIN_M`: if it came so near in the ego's own track, from behind, or if the ego had stood for `STOOD_S`.

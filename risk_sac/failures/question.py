@@ -1,4 +1,4 @@
-"""Questions of a failure that take the simulator, for processes that must not load it; see `failures.study`."""
+"""Questions about a failure for the simulator, posed by processes without it."""
 
 import io
 from collections.abc import Mapping, Sequence
@@ -53,7 +53,10 @@ class TwinPlay(Record):
         violations: Sequence[Collision | Violation],
         name: str = "",
     ) -> Self:
-        """Describes a twin with another ego, or with None: without an attack; `violations` are the twin's."""
+        """Describes a twin with another ego, or without an attack (None).
+
+        `violations` are the twin's.
+        """
         changed = "no attack" if ego is None else f"ego: {name or ego.name}"
         kept = "no contact" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
         violated = {each.requirement: each.event for each in violations}

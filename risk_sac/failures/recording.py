@@ -1,4 +1,4 @@
-"""A failure and its time series, with time counted from the violation that names it."""
+"""A failure and its time series, with times relative to its violation."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ BOX = [(1, 1), (-1, 1), (-1, -1), (1, -1)]  # corners of a body
 
 
 def on_body(pose: Sequence[float], size_m: tuple[float, float], corners: Sequence[tuple[float, float]]) -> Floats:
-    """Returns places on a body; its corners are in half lengths ahead and half widths to the left."""
+    """Returns places on a body; corners: half lengths ahead, half widths left."""
     x, y, heading = pose
     cos, sin = np.cos(heading), np.sin(heading)
     placed: Floats = np.array(corners) * (np.array(size_m) / 2) @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
@@ -33,7 +33,7 @@ def actions_of(series: Series) -> Floats:
 
 
 def trajectory_digest(series: Series) -> str:
-    """SHA-256 over the names, types, shapes and bytes of all arrays, however they were compressed."""
+    """Returns SHA-256 over all arrays' names, types, shapes and uncompressed bytes."""
     digest = hashlib.sha256()
     for name in sorted(series):
         array = np.ascontiguousarray(series[name])
@@ -44,7 +44,7 @@ def trajectory_digest(series: Series) -> str:
 
 @dataclass(frozen=True)
 class Recording:
-    """A failure's time series, or its twin's, with time counted from the violation; a contact ends the series."""
+    """Time series of a failure or its twin, timed from the violation."""
 
     failure: RecordedFailure
     series: Mapping[str, NDArray[np.generic]]
@@ -85,7 +85,7 @@ class Recording:
 
     @cached_property
     def other(self) -> int | None:
-        """Column of the touched or most relevant actor, the ego's being 0; None without one."""
+        """Column of the touched or most relevant actor (ego: 0), or None."""
         other = self.violation.other_id
         return None if other is None else [str(id_) for id_ in self.series["ids"]].index(other)
 
@@ -103,13 +103,13 @@ class Recording:
         return np.asarray(self.series[name], dtype=np.float64)
 
     def pose(self, actor: int, time_s: float) -> tuple[float, float, float]:
-        """Centre and heading at any time within the recording, between two frames as the search for contacts does."""
+        """Returns centre and heading at a time, interpolated between two frames."""
         x, y, heading = (self[name][:, actor] for name in ("x_m", "y_m", "heading_rad"))
         at = (float(np.interp(time_s, self.time_s, values)) for values in (x, y, np.unwrap(heading)))
         return next(at), next(at), next(at)
 
     def hidden(self) -> Iterator[tuple[float, float]]:
-        """The spans in which the ego could not see the other; none without one."""
+        """Yields spans in which the ego does not see the other."""
         if self.other is None:
             return
         unseen = np.concatenate(([False], self["visible"][:, self.other] == 0, [False]))

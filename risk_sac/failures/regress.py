@@ -1,4 +1,4 @@
-"""Plays old failures against another ego: which are fixed, and which are not.
+"""Plays old failures against another ego, and tells which are fixed.
 
 Each is first played with its own ego, so that nothing counts as fixed that would not fail here anyway. Then the other
 ego meets the recorded actions, and after them the policy that found the failure, if there is one: a contact that is
@@ -74,7 +74,7 @@ def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
 
 
 def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
-    """Plays the first failures of each variant of a run against another ego.
+    """Plays each variant's first failures of a run against another ego.
 
     Raises:
       ConfigError: the folder holds no run, or none whose policy can act on.

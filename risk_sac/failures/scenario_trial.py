@@ -1,4 +1,4 @@
-"""Plays a scenario document without an attack, and says what a user has to know before a search."""
+"""Plays a scenario document without an attack; reports problems before a search."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ NEAR_M = 5.0  # between the middles of two ways on which bodies may touch; choic
 
 
 def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
-    """Names the adversaries that in no scene can come near the ego's way.
+    """Names the adversaries that in no scene can approach the ego's way.
 
     A vehicle follows lanes, over any turn, as fast as it may; what moves freely goes straight there. `limits` are those
     before the bodies' own.
@@ -108,7 +108,7 @@ PLAYED = 20
 
 
 def try_document(document: Scenario, nets: Mapping[str, str], count: int = PLAYED, seed: int = 0) -> ScenarioCheck:
-    """Checks a document, and plays scenes of it with the default ego and undisturbed traffic.
+    """Checks a document, and plays its scenes undisturbed with the default ego.
 
     `nets` has the file of each network that it names; `seed` is of scenes and SUMO.
 
@@ -259,7 +259,7 @@ def _figure(
 
 
 def _view(boxes: Sequence[Floats]) -> tuple[Floats, Floats, float]:
-    """Returns the corners of the view around the boxes, m, and its width over its height."""
+    """Returns corners of the view around the boxes, m, and aspect ratio."""
     points = np.concatenate(boxes)
     low, high = points.min(axis=0) - AROUND_M, points.max(axis=0) + AROUND_M
     wide_m, high_m = high - low

@@ -1,4 +1,4 @@
-"""Describes a failure in one sentence: where the striker was, what it did, and how the ego responded."""
+"""Describes a failure in a sentence: striker's place, act, ego's response."""
 
 import math
 from itertools import groupby
@@ -116,14 +116,14 @@ def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
 
 
 def _lasting(values: Floats, limit: float, least: float) -> list[int]:
-    """Returns the last stretch above a limit in which the values sum up to `least`."""
+    """Returns the last stretch above `limit` whose sum reaches `least`."""
     stretches = [list(frames) for above, frames in groupby(range(len(values)), lambda t: values[t] > limit) if above]
     enough = (frames for frames in reversed(stretches) if len(frames) >= 2 and values[frames].sum() * STEP_S >= least)
     return next(enough, [])
 
 
 def _response(series: Series, began: int, response: str) -> str:
-    """Returns the recorded response in words, with how late it is, or what was before it."""
+    """Returns the response in words, with its delay or what precedes it."""
     braked = np.flatnonzero(series["accel_mps2"][began:, 0] <= -BRAKES_MPS2)
     if response == "late_braking":
         late_s = (int(braked[0]) if len(braked) else 0) * STEP_S - R157_PERCEIVES_S - R157_DELAY_S

@@ -1,4 +1,4 @@
-"""Draws one failure like the paper's Fig. 2: paths from above, and measures."""
+"""Draws one failure like the paper's Fig. 2: paths and measures."""
 
 import textwrap
 from collections.abc import Callable, Iterator
@@ -115,7 +115,7 @@ def _distance(axis: Axes, recording: Recording) -> None:
 
 
 def _near_m(recording: Recording) -> float:
-    """Returns a scale for the distances from 1 s before the conflict on; those before would flatten them."""
+    """Returns a scale for distances from 1 s before the conflict on."""
     began_s = -VIEW_S if recording.conflict_s is None else recording.conflict_s
     near = _least(recording, "distance_m")[recording.time_s >= began_s - 1.0]
     return 1.08 * max([LEAST_M, *map(float, near[np.isfinite(near)])])
@@ -131,7 +131,7 @@ def _to_the_other(axis: Axes, recording: Recording, name: str) -> None:
 
 
 def _least(recording: Recording, name: str) -> Floats:
-    """Returns what was measured to the other, `T`; without one, the least to any actor."""
+    """Returns a measure to the other, or the least of all, `T`."""
     values = recording[name]
     least: Floats = np.fmin.reduce(values, axis=1) if recording.other is None else values[:, recording.other]
     return least
@@ -153,7 +153,7 @@ PANELS: tuple[Callable[[Axes, Recording], None], ...] = (_speeds, _accelerations
 
 
 def _mark_instants(axis: Axes, recording: Recording) -> None:
-    """Draws upright lines at the instants, and grey ground where the ego did not see the other."""
+    """Draws vertical lines at instants, and grey where the other is hidden."""
     axis.grid(visible=True, linewidth=0.3)
     for start, end in recording.hidden():
         axis.axvspan(start, end, color=HIDDEN_COLOUR, zorder=0)
@@ -191,7 +191,7 @@ def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
 
 
 def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording | None = None) -> None:
-    """Draws a failure, and its twin beside it, into a png, pdf or svg file."""
+    """Draws a failure, with its twin beside, as png, pdf or svg."""
     if file.suffix not in (".png", ".pdf", ".svg"):
         raise ConfigError("out", f"{str(file)!r}", "a name that ends in .png, .pdf or .svg")
     content = recording_bytes(family, recording, file.suffix.removeprefix("."), twin)
@@ -236,7 +236,7 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
 
 
 def _extent(recording: Recording) -> tuple[Floats, Floats]:
-    """Computes the corners of the ground that both covered in the last seconds, widened to fit the page."""
+    """Computes corners of the ground of both bodies, fitted to the page."""
     begin_s = recording.conflict_s
     shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
     shown &= recording.time_s < STEP_S

@@ -1,4 +1,4 @@
-"""Results of replaying failures: cores, regions, and what another ego does of them.
+"""Results of replaying failures: cores, regions, and verdicts of other egos.
 
 Studies of a run's failures are files beside its results.
 """
@@ -71,7 +71,7 @@ class PlausibleMotion(Record):
 
 
 def valid_failure(id_: str, episode: EpisodeRecord) -> Collision | Violation:
-    """Returns the violation that names a valid failure; a ConfigError for others, which have no core or region."""
+    """Returns a valid failure's violation; raises a `ConfigError` for others."""
     violation = episode.worst_violation
     if violation is None or not violation.valid:
         why = f": it breaks {episode.reason.replace('_', ' ')}" if episode.reason else ""
@@ -83,7 +83,7 @@ NEEDLE = 0.5
 
 
 class Share(Record):
-    """Share of copies that differ from a failure in one way and still fail."""
+    """Share of copies with one difference from a failure that still fail."""
 
     what: str
     """The difference."""
@@ -101,14 +101,14 @@ class Share(Record):
 
 
 class Region(Record):
-    """Surroundings of a failure: shares of copies that still fail, the nearest copies first."""
+    """Surroundings of a failure: shares of failing copies, the nearest first."""
 
     shares: tuple[Share, ...]
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def needle(self) -> bool:
-        """Whether fewer than half of the nearest scenes fail, so that the failure is unlikely to recur."""
+        """Whether under half of the nearest scenes fail, so recurrence is unlikely."""
         nearest = self.shares[0]
         return nearest.failed < NEEDLE * nearest.played
 
@@ -132,7 +132,7 @@ class _Note(Studied):
 
 
 def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
-    """Writes the core or the region of a failure, with the results' digest, into a run's folder."""
+    """Writes a failure's core or region with the results' digest."""
     file = folder / STUDIES / f"{index:06d}-{'region' if studied.core is None else 'core'}.json"
     file.parent.mkdir(exist_ok=True)
     replace_file(file, _Note(digest=digest, **dict(studied)).model_dump_json(indent=2).encode())
@@ -147,7 +147,7 @@ def edition(folder: Path) -> str:
 
 
 def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
-    """Reads the studies of results with this digest, by episode index; damaged files are left out."""
+    """Reads undamaged studies of results with this digest, by episode index."""
     studies: dict[int, Studied] = {}
     for file in sorted((folder / STUDIES).glob("*.json")):
         name = _NAME.fullmatch(file.name)
@@ -222,7 +222,7 @@ class Regression(Record):
         return ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
 
     def beside(self, baseline: "Regression") -> "Regression":
-        """Marks the cases that the baseline has with the same verdict and the same failure instead as known.
+        """Marks cases as known whose verdict and failure the baseline has.
 
         The reason of another case that does not pass tells why it is not known.
         """
@@ -248,7 +248,7 @@ def _compared(case: Case, before: Sequence[Case]) -> Case:
 
 
 class CampaignRegression(Record):
-    """The distinct failures of a campaign against another ego, as the service plays them."""
+    """A campaign's distinct failures against another ego, played by the service."""
 
     id: str
     campaign_id: str

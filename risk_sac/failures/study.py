@@ -1,4 +1,4 @@
-"""Makes bundles of the failures of a run, and answers questions that take the simulator.
+"""Bundles a run's failures, and answers questions that take the simulator.
 
 `python -m risk_sac.failures.study QUESTION ANSWER` reads the one file and writes the other.
 """
@@ -69,7 +69,7 @@ def _policy(question: Question) -> FrozenPolicy | None:
 
 
 def bundles(folder: Path, results: RunResults, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
-    """Yields bundles of failures of a run, each after it was played again.
+    """Yields bundles of a run's failures, each after it is replayed.
 
     Raises:
       SimulationError: a failure does not repeat.
@@ -83,7 +83,7 @@ def bundles(folder: Path, results: RunResults, episodes: Sequence[EpisodeRecord]
 
 
 def recorded_bundle(folder: Path, results: RunResults, episode: EpisodeRecord, policy: FrozenPolicy | None) -> Bundle:
-    """Returns a bundle of a failure as it was recorded, whether or not it repeats; without signal heads.
+    """Returns a bundle of a failure as recorded, unchecked, without signal heads.
 
     By which code it was recorded is known of runs that were verified.
 
@@ -99,7 +99,7 @@ def recorded_bundle(folder: Path, results: RunResults, episode: EpisodeRecord, p
 
 
 def policy_of(folder: Path, results: RunResults) -> FrozenPolicy | None:
-    """Returns a run's final policy; None if it learns none, goes on, or has no checkpoint that fits."""
+    """Returns a run's final policy; None if unlearned, unfinished or without checkpoint."""
     spec = results.spec
     if not method_of(spec.method).learns or not results.finished:
         return None

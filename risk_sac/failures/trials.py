@@ -71,7 +71,7 @@ class EgoTrial(Record):
 
 
 def unusable(trials: Sequence[EgoTrial]) -> list[str]:
-    """Returns why a search against an ego would tell nothing; empty if it is fit."""
+    """Returns reasons why an ego is unfit for a search, or none."""
     reasons = [f"{trial.scenario}: {trial.failed}" for trial in trials if trial.failed]
     reasons += [f"{trial.scenario}: it touches {trial.contact} without an attack" for trial in trials if trial.contact]
     drove = [trial for trial in trials if not trial.failed]
@@ -152,7 +152,7 @@ def _drive(env: RiskSacEnv, pilot: EgoPilot, scenario: str) -> EgoTrial:
 
 
 def _drawn(scenario: str, scene: Scene, series: Series) -> Figure:
-    """Draws the ways from above: the ego's with a dot each second, those of others in grey."""
+    """Draws ways from above: the ego's with second marks, others grey."""
     x, y = series["x_m"], series["y_m"]
     low = np.array([x[:, 0].min(), y[:, 0].min()]) - MARGIN_M
     high = np.array([x[:, 0].max(), y[:, 0].max()]) + MARGIN_M
@@ -202,7 +202,7 @@ class Tried:
 
     @property
     def unlike(self) -> str | None:
-        """Returns in which way pedestrians from either side differ; None: they do not."""
+        """Returns how pedestrians of both sides differ, or None."""
         left, right = self.sides
         if math.isinf(min(left, right)):
             return "the ego stands although nothing is in its way: no pedestrian can meet it"
@@ -218,7 +218,7 @@ class Tried:
 
 
 def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:
-    """Draws so many places of each pattern, or all if there are fewer."""
+    """Draws up to `count` places of each pattern."""
     draw = np.random.default_rng(seed)
     chosen: list[Fit] = []
     for pattern in dict.fromkeys(fit.spot.pattern for fit in fits):
@@ -228,7 +228,7 @@ def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:
 
 
 def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
-    """Plays at one place so many scenes, each without an attack and with random actions."""
+    """Plays `episodes` scenes at a place, unattacked and with random actions each."""
     tried = Tried(fit)
     problem = Problem.from_spec(RunSpec(family=family, method="random", seed=0))
     for controlled in (False, True):
@@ -258,7 +258,7 @@ def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, contro
 
 
 def meet(sim: SumoSimulation, family: str, side: int) -> float:
-    """Returns the least distance of a lone ego to a pedestrian that would meet it, m.
+    """Returns a lone ego's least distance to a meeting pedestrian, m.
 
     The pedestrian crosses where the ego drives on an empty road, and is in the middle of its way at that moment:
     in bends, and where the ego changes lanes, as well as on a straight road. It comes from `side`, LEFT or RIGHT.
@@ -288,7 +288,7 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
 
 
 def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, float] | None:
-    """Returns the first step after AHEAD_S in which the ego drives, and its pose."""
+    """Returns the ego's first driving step after AHEAD_S, and its pose."""
     sim.reset(alone, 1)
     for step in range(1, MET_STEPS + 1):
         frame = sim.step()
@@ -298,7 +298,7 @@ def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, f
 
 
 def _at_green(sim: SumoSimulation, layout: Layout, cycle_s: float) -> Layout:
-    """The same at the beginning of the ego's green, if there is one."""
+    """Returns the layout at the beginning of the ego's green, if any."""
     if layout.signal is None:
         return layout
     before = Signal.GREEN

@@ -37,7 +37,7 @@ class Variant:
     seed: int
 
     def perturbed(self, space: SceneSpace, scene: float, actions: float, random: np.random.Generator) -> "Variant":
-        """A copy moved by up to a share of each parameter's range, and of each action."""
+        """Returns a copy perturbed by shares of the parameters' ranges and actions."""
         shift = random.uniform(-scene, scene, len(self.scene)) * (space.high - space.low)
         factors = 1.0 + random.uniform(-actions, actions, self.actions.shape)
         return replace(
@@ -58,7 +58,7 @@ class VariantPlayer:
     """
 
     def __init__(self, bundle: Bundle) -> None:
-        """Plays the failure once more; a SimulationError if it does not happen here."""
+        """Plays the failure once more; a `SimulationError` if it does not recur."""
         episode = bundle.manifest.episode
         self.failure = valid_failure(bundle.manifest.id, episode)
         check_world(bundle.manifest)
@@ -81,7 +81,7 @@ class VariantPlayer:
         return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
 
     def play(self, variant: Variant) -> Sequence[Collision | Violation]:
-        """Returns the violations of a variant, that which names it first; none if its scene is infeasible.
+        """Returns a variant's violations, valid ones first; empty if infeasible.
 
         What begins more than `TAIL_S` after the failure is left out.
         """
@@ -102,13 +102,13 @@ class VariantPlayer:
         return alike(self.play(variant), self.failure) is not None
 
     def copies(self, variant: Variant, share: float, count: int, random: np.random.Generator) -> Iterator[Variant]:
-        """Yields copies whose scene and actions are perturbed by up to a share."""
+        """Yields copies with scene and actions perturbed by up to `share`."""
         for _ in range(count):
             yield variant.perturbed(self.space, share, share, random)
 
 
 def alike(violations: Sequence[Collision | Violation], wanted: Collision | Violation) -> Collision | Violation | None:
-    """Returns a valid violation that is like another one; None if there is none.
+    """Returns a valid violation like the wanted one, or None.
 
     Contacts that are alike have the same striker and came about in the same type of conflict. Violations without
     contact are of the same requirement. Choice: whatever is near, since that changes from copy to copy where no actor
@@ -138,7 +138,7 @@ def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) 
 
 
 def region(bundle: Bundle) -> Region:
-    """Plays a failure in scenes near its own, in other traffic, with other actions.
+    """Plays a failure in near scenes, other traffic, and with other actions.
 
     It plays 170 episodes. `alike` decides which of them fail as the failure did.
 

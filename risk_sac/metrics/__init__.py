@@ -1,4 +1,4 @@
-"""Computes ECR, PCR, ES, ρ̄_c and OFD with 95 % intervals, and the records' digest.
+"""ECR, PCR, ES, ρ̄_c and OFD with intervals, and the records' digest.
 
 A figure is a row of `rows`: its names, its formula, and how runs are pooled. `tally` counts what formulas take.
 

@@ -37,7 +37,7 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
 
 
 def clopper_pearson(successes: int, trials: int) -> tuple[float, float]:
-    """Exact one-sided 95 % bounds of a rate, from trials that are independent and alike.
+    """Returns exact one-sided 95 % bounds of a rate from independent trials.
 
     With the upper bound as the rate, no more than k successes come in 5 % of all cases; with the lower one, no fewer.
     The rate is below the one with 95 % confidence, and above the other with 95 %; between both with 90 %.
@@ -75,7 +75,7 @@ def bootstrap_interval(values: Sequence[float], seed: int) -> tuple[float, float
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """A figure of each run; of several runs their mean, with an interval."""
+    """A figure of each run; over several runs a mean with interval."""
 
     name: str  # in `table.json`, `table.csv`, the API and names of figures
     symbol: str  # in tables
@@ -94,7 +94,7 @@ class Metric:
         return value
 
     def interval(self, value: float, counts: Counts) -> tuple[float, float] | None:
-        """Wilson's 95 % interval of one run's rate; None for what is no rate."""
+        """Returns Wilson's 95 % interval of one run's rate; None for non-rates."""
         if self.trials is None:
             return None
         trials = self.trials(counts)
@@ -103,7 +103,7 @@ class Metric:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratio:
-    """A figure of counts; of several runs that of their sums, without an interval."""
+    """A figure of counts; over several runs of their sums, without interval."""
 
     name: str
     symbol: str
@@ -127,7 +127,7 @@ class Estimate:
 
 
 def estimate(metric: Metric, metrics: Sequence[RunMetrics]) -> Estimate:
-    """Returns the mean over the runs that have a value, with its 95 % interval.
+    """Returns the mean over runs with a value, with 95 % interval.
 
     Choice: the interval of a rate is Wilson's over the pooled trials, widened to the bootstrap interval over the runs.
     The bootstrap alone ends at the worst run: at 0 where none has failed, however short the runs were.
@@ -155,18 +155,18 @@ def _values(metric: Metric, metrics: Sequence[RunMetrics]) -> list[float]:
 
 
 def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
-    """Each count summed over the runs; what two runs found alike counts twice."""
+    """Sums each count over runs; what two runs found counts twice."""
     return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in Counts.model_fields})
 
 
 def pooled_headline(metrics: Iterable[RunMetrics]) -> int | None:
-    """Headline failures of several runs: what they found alike counts once; None if none was replayed."""
+    """Counts distinct headline failures of several runs; None if none was replayed."""
     replayed = [each for each in metrics if each.headline is not None]
     return len({kind for each in replayed for kind in each.headline_kinds}) if replayed else None
 
 
 def pooled_published(metrics: Iterable[RunMetrics]) -> int | None:
-    """Counts the headline failures of several runs that R157, FSM or RSS prevents; as `pooled_headline`."""
+    """Counts headline failures that R157, FSM or RSS prevents; see `pooled_headline`."""
     replayed = [run for run in metrics if run.headline is not None]
     return len({kind for run in replayed for kind in run.headline_kinds_published}) if replayed else None
 
@@ -184,7 +184,7 @@ def headline_driven_by(metrics: Iterable[RunMetrics]) -> dict[str, int]:
 
 
 def pooled_names(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:
-    """Counts by name summed over the runs, in the order in which the runs first met the names."""
+    """Sums counts by name over the runs, in order of first appearance."""
     pooled: Counter[str] = Counter()
     for each in counts:
         pooled.update(each)
@@ -192,7 +192,7 @@ def pooled_names(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:
 
 
 def pcr_by_driver(metrics: Sequence[RunMetrics]) -> dict[str, DriverPcr]:
-    """Each reference driver's own PCR, over the runs whose contacts the drivers were asked for."""
+    """Returns each reference driver's PCR over the runs that asked the drivers."""
     asked = [each for each in metrics if each.prevented_by or not each.collisions]
     rated, pooled = sum(each.rated for each in asked), {}
     for name, prevented in pooled_names([each.prevented_by for each in asked]).items():
@@ -202,12 +202,12 @@ def pcr_by_driver(metrics: Sequence[RunMetrics]) -> dict[str, DriverPcr]:
 
 
 def pooled_bins(histograms: Sequence[Sequence[int]]) -> tuple[int, ...]:
-    """Histograms summed bin by bin; one from before there were any is empty."""
+    """Sums histograms bin by bin; those of older versions are empty."""
     return tuple(map(sum, zip_longest(*histograms, fillvalue=0)))
 
 
 class Feature(NamedTuple):
-    """One outcome feature and the physical range that is scaled to [0, 1]; values beyond it are clipped."""
+    """An outcome feature and its range, scaled to [0, 1] with clipping."""
 
     name: str
     low: float
@@ -224,7 +224,7 @@ FEATURES = (
 
 
 def outcome_features(collision: Collision) -> Floats:
-    """The outcome features of one failure, in the order of `FEATURES`, each scaled to [0, 1] and clipped.
+    """Returns a failure's outcome features, `FEATURES`, scaled and clipped to [0, 1].
 
     Raises:
         NotFinite: a feature is NaN; infinite ones are clipped.
@@ -238,7 +238,7 @@ def outcome_features(collision: Collision) -> Floats:
 
 
 class Spread:
-    """Σ_{i<j} ||x_i - x_j|| over the failures' features; another failure costs as many distances as there are."""
+    """Σ_{i<j} ||x_i - x_j|| over failures' features; adding one costs O(failures)."""
 
     def __init__(self) -> None:
         self.distance = 0.0

@@ -1,4 +1,4 @@
-"""The metrics: their formulas, a row for each, and a run's figures and digest kept up to date.
+"""The metrics: their formulas and rows, and a run's figures and digest.
 
 Source: RISK-SAC, Sec. IV; what the paper leaves open is marked as a choice.
 """
@@ -19,7 +19,7 @@ PER_STEPS = 1000  # environment steps over which the rate of distinct failures i
 
 
 def effective_collision_rate(counts: Counts) -> float:
-    """ECR: valid contacts per episode, rejected scenes included, invalid ones not; 0 without. Source: Sec. IV."""
+    """ECR: valid contacts per rated episode, rejected scenes included. Source: Sec. IV."""
     return _share(counts.collisions, counts.rated)
 
 
@@ -285,7 +285,7 @@ def _figures(tally: Tally) -> dict[str, Any]:
 
 
 class ResultsDigest:
-    """SHA-256 over one line of canonical JSON per record; equal digests mean equal results.
+    """SHA-256 of the records' canonical JSON; equal digests mean equal results.
 
     Keys are sorted, and floats written so that they read back exactly. Records hold no wall-clock values.
     """

@@ -66,7 +66,7 @@ def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementC
 
 
 def requirement_cells(name: str, requirement: RequirementCounts) -> list[str]:
-    """The cells of a requirement's row, under `COLUMNS`; a dash where nothing is judged."""
+    """Formats a requirement's row under `COLUMNS`; a dash where nothing is judged."""
     judged = (requirement.valid, requirement.distinct, requirement.preventable, requirement.published)
     steps = map(str, judged) if requirement.counts == "failure" else "––––"
     rate = f"{requirement.rate:.3f} [{requirement.rate_low:.3f}, {requirement.rate_high:.3f}]"
@@ -74,7 +74,7 @@ def requirement_cells(name: str, requirement: RequirementCounts) -> list[str]:
 
 
 def with_published(count: int | None, published: int | None) -> str:
-    """Formats a count of preventable failures, and in brackets those that R157, FSM or RSS prevents."""
+    """Formats a count, in brackets those that R157, FSM or RSS prevents."""
     return "–" if count is None else f"{count:,} ({published or 0:,})"
 
 
@@ -90,12 +90,12 @@ WINDOW = 100  # number of episodes of the sliding ECR and PCR
 
 
 def preventable(record: EpisodeRecord) -> bool:
-    """Whether the episode has a valid violation that a reference driver would have prevented."""
+    """Whether a reference driver would have prevented one of the valid violations."""
     return any(violation.preventable for violation in record.valid_violations)
 
 
 def published(record: EpisodeRecord) -> bool:
-    """Whether the episode has a valid violation that R157, FSM or RSS would have prevented."""
+    """Whether R157, FSM or RSS would have prevented a valid violation."""
     return any(violation.published_preventable for violation in record.valid_violations)
 
 
@@ -192,7 +192,7 @@ class Tally(Counts):
         self.newest_failures, self.newest_preventable = map(sum, zip(*self._newest, strict=True))
 
     def requirement_counts(self) -> dict[str, RequirementCounts]:
-        """Requirement → its funnel, in the order in which they were first met; none without records of them."""
+        """Requirement → its funnel, in order of first appearance; empty without records."""
         return {name: each.counts(self.rated) for name, each in self._requirements.items()} if self._measured else {}
 
     def _add_violations(self, record: EpisodeRecord) -> None:

@@ -28,7 +28,7 @@ class Variables:
     """Variables, and parameters that actions set, which are variables too."""
 
     def __init__(self, declarations: list[At], parameters: Parameters) -> None:
-        """Reads the elements `VariableDeclaration`; raises `ConfigError` if one has no value or is there twice."""
+        """Reads `VariableDeclaration` elements; raises `ConfigError` for a missing value or duplicate."""
         self.numbers: dict[str, Expression] = {}
         self.words: dict[str, str] = {}
         self._parameters = parameters
@@ -43,7 +43,7 @@ class Variables:
                 self.numbers[name] = at.number("value")
 
     def action(self, at: At) -> act.VariableAction:
-        """Reads a `VariableAction`, or a `ParameterAction`, which makes a variable of the parameter."""
+        """Reads a `VariableAction`; a `ParameterAction` makes its parameter a variable."""
         name = self._name(at, "variableRef" if at.tag == "VariableAction" else "parameterRef")
         setting, change = at.maybe("SetAction"), at.maybe("ModifyAction")
         if setting is not None:
@@ -63,7 +63,7 @@ class Variables:
         return name
 
     def begin(self, actions: list[act.VariableAction]) -> None:
-        """Gives variables the values that are set at time 0; raises `ConfigError` for other changes."""
+        """Sets variables at time 0; raises `ConfigError` for other changes."""
         for action in actions:
             if action.how != "set":
                 raise ConfigError("Init", f"a change of the variable {action.variable!r}", "a SetAction")
@@ -86,7 +86,7 @@ class Variables:
         return {"value": at.number("value")}
 
     def condition(self, at: At, common: dict[str, Any]) -> VariableCondition:
-        """Reads a `VariableCondition` or `ParameterCondition`; `common` has the fields that all conditions have."""
+        """Reads a `VariableCondition` or `ParameterCondition`; `common` has all conditions' fields."""
         rule = at.one_of("rule", RULES)
         if at.tag == "VariableCondition":
             name = self._name(at, "variableRef")
@@ -163,7 +163,7 @@ class ActionReader:
         }
 
     def of_event(self, at: At, actors: tuple[str, ...]) -> act.Action:
-        """Reads an element `Action` of an event; one that is not read does nothing, and is reported."""
+        """Reads an event's `Action`; an unread one is reported and does nothing."""
         holder = at.one("PrivateAction", "GlobalAction", "UserDefinedAction")
         if holder.tag == "UserDefinedAction":
             return self._none(holder, _EFFECTS[holder.tag])
@@ -198,7 +198,7 @@ class ActionReader:
         raise here.unread(_READ, "the action does nothing")
 
     def on_all(self, holder: At) -> act.Action:
-        """Reads an element `GlobalAction`; one that is not read does nothing, and is reported."""
+        """Reads a `GlobalAction`; an unread one is reported and does nothing."""
         here = holder.only("actions")
         if here.tag == "EntityAction":
             if here.maybe("DeleteEntityAction") is not None:
@@ -226,7 +226,7 @@ class ActionReader:
         return at.build(act.SpeedAction, target=target, dynamics=dynamics)
 
     def _target(self, at: At, what: str) -> Any:
-        """Reads the child `Absolute…` as a number, or `Relative…` as a value beside an actor's."""
+        """Reads the child `Absolute…` as a number, `Relative…` as an actor-relative target."""
         if (absolute := at.maybe(f"Absolute{what}")) is not None:
             return absolute.number("value")
         relative = at.one(f"Relative{what}")

@@ -52,7 +52,7 @@ class ConditionReader:
         """Element → model, and what reads the fields that other conditions do not have."""
 
     def trigger(self, at: At | None) -> when.Trigger | None:
-        """Reads a `StartTrigger` or `StopTrigger`; None if it is not there or has no group."""
+        """Reads a `StartTrigger` or `StopTrigger`; None if absent or without groups."""
         if at is None:
             return None
         groups = tuple(tuple(map(self._condition, group.all("Condition"))) for group in at.all("ConditionGroup"))

@@ -1,4 +1,4 @@
-"""Variation files: ranges, sets, value sets and probability distributions of a scenario's parameters.
+"""Variation files: ranges, sets, value sets and distributions of a scenario's parameters.
 
 Source: ASAM OpenSCENARIO XML 1.3, ParameterValueDistribution.
 """
@@ -32,7 +32,7 @@ class Variation:
     """Reads what a variation file says of parameters."""
 
     def __init__(self, kinds: Mapping[str, str], remarks: list[str]) -> None:
-        """Prepares to read, with the type of each parameter; distributions that are not read are added to `remarks`."""
+        """Takes each parameter's type; unread distributions are added to `remarks`."""
         self._kinds, self._remarks = kinds, remarks
 
     def read(self, block: At) -> list[Varied]:
@@ -168,7 +168,7 @@ _LAWS: Mapping[str, Callable[[At], Any]] = {
 
 
 def _check(block: At, varied: Sequence[Varied]) -> None:
-    """Refuses parameters that are there twice, and a grid of too many points."""
+    """Refuses duplicate parameters and a grid of too many points."""
     names, points = set[str](), 1
     for part in varied:
         for name in part.names:
@@ -181,7 +181,7 @@ def _check(block: At, varied: Sequence[Varied]) -> None:
 
 
 def points_of(part: Varied) -> int:
-    """Points of the grid along one axis; 1 for a range without a step."""
+    """Returns an axis's number of grid points; 1 without a step."""
     if part.parameter is None or part.parameter.range is None:
         return len(part.rows) or 1
     low, high = part.parameter.range

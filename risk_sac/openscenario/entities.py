@@ -28,7 +28,7 @@ class Catalogs:
     """Catalogs that a scenario file gives the folders of."""
 
     def __init__(self, sources: SourceFiles, file: Path, locations: At | None) -> None:
-        """Notes the folders of `CatalogLocations`; files are read when an entry is wanted."""
+        """Notes the folders of `CatalogLocations`; files are read on demand."""
         self._sources, self._file = sources, file
         self._folders = (
             [folder for kind in locations.element.children for folder in _folders(kind)] if locations else []
@@ -37,7 +37,7 @@ class Catalogs:
         self._references = 0
 
     def entry(self, reference: At, catalog: str, name: str, *tags: str) -> At:
-        """Returns an entry of a catalog with the reference's assignments as its parameters.
+        """Returns a catalog entry with the reference's assignments as its parameters.
 
         Raises:
           ConfigError: there is no such catalog or entry, it is of another kind, or a value is missing.
@@ -62,7 +62,7 @@ class Catalogs:
         return self.entry(reference, reference.constant("catalogName"), reference.constant("entryName"), *tags)
 
     def alternatives(self, reference: At, *tags: str) -> At | Alternatives:
-        """Returns the entry that a reference names, or one for each word of a parameter.
+        """Returns a reference's entry, or one for each word of a parameter.
 
         Raises:
           ConfigError: two parameters choose catalog and entry, and an entry is in several of the catalogs or none.
@@ -79,7 +79,7 @@ class Catalogs:
         return Alternatives(choice.by, entries)
 
     def _pair(self, reference: At, catalog: Text, name: Text) -> tuple[str, str]:
-        """Returns catalog and entry; of several catalogs the one that has the entry."""
+        """Returns catalog and entry; of several catalogs the one with the entry."""
         assert isinstance(name, str)
         if isinstance(catalog, str):
             return catalog, name
@@ -116,7 +116,7 @@ def _names(catalog: XmlElement | None) -> set[str]:
 
 
 def assignments(reference: At) -> dict[str, Meaning]:
-    """Returns the values that a reference assigns to an entry's parameters, as its own scope has them."""
+    """Returns the values that a reference assigns, evaluated in its own scope."""
     block = reference.maybe("ParameterAssignments")
     return (
         {one.constant("parameterRef"): one.meaning("value") for one in block.all("ParameterAssignment")}
@@ -126,7 +126,7 @@ def assignments(reference: At) -> dict[str, Meaning]:
 
 
 def parametrised(at: At, assigned: Mapping[str, Meaning]) -> At:
-    """Returns an element, in the scope outside it, with its own `ParameterDeclarations`, or values in their place.
+    """Returns an element in a scope with its declared or assigned parameters.
 
     Raises:
       ConfigError: a value names a parameter that is not declared before it, or an assigned one is not declared.
@@ -212,14 +212,14 @@ class Entities:
         self.all = {name: self._read(at, name) for at, name in zip(objects, given, strict=True)}
 
     def named(self, at: At, attribute: str = "entityRef") -> str:
-        """Returns the document's name of the one entity that an element names; raises `ConfigError`."""
+        """Returns the document's name of one entity; raises `ConfigError` for a selection."""
         names = self.members(at, attribute)
         if len(names) != 1:
             raise at.refusal(f"{attribute}, a selection of {len(names)} entities", "one entity")
         return names[0]
 
     def members(self, at: At, attribute: str = "entityRef") -> tuple[str, ...]:
-        """Returns the document's names of the entities that an element names, alone or as a selection."""
+        """Returns the document's names of an entity or of a selection."""
         name = at.constant(attribute)
         if name in self._names:
             return (self._names[name],)
@@ -318,7 +318,7 @@ def _ego(block: At, objects: list[At], wanted: str | None) -> str:
 
 
 def _document_names(given: list[str], ego: str) -> dict[str, str]:
-    """Returns the document's name of each entity: its own as far as it is one."""
+    """Returns each entity's name in the document, without invalid characters."""
     names = {ego: EGO}
     for name in given:
         if name == ego:

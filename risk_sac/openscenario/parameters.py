@@ -130,7 +130,7 @@ class Parameters:
         return f"{name[: _LONGEST_WORD - 5]}_word"
 
     def word(self, name: str, text: str) -> str:
-        """Returns the word for a parameter's text, or one for no text of it."""
+        """Returns the word for a parameter's text, or one for other texts."""
         meaning = self.meaning(name)
         words = {text: word for word, text in (meaning.words if meaning else {}).items()}
         return words.get(text) or f"{words_of([text])[text][: _LONGEST_WORD - 6]}_other"
@@ -177,7 +177,7 @@ class Parameters:
         return list(ordered)
 
     def document(self) -> dict[str, ScenarioParameter]:
-        """Returns the document's parameters: those that vary first, then the others after those that they name."""
+        """Returns the document's parameters: first those that vary, then by dependency."""
         parameters = dict[str, ScenarioParameter]()
         for part in self._parts:
             if part.parameter is not None:
@@ -193,7 +193,7 @@ class Parameters:
         return parameters
 
     def _rows(self, part: Varied) -> ScenarioParameter:
-        """Returns rows of numbers and words, or words if it has no more than those of one name."""
+        """Returns rows of numbers and words, or one name's words alone."""
         if part.names == (part.name,) and not self.is_number(part.name):
             words = tuple(self.word(part.name, row[part.name]) for row in part.rows)
             return part.place.build(ScenarioParameter, words=words, distribution=part.weights)
@@ -214,7 +214,7 @@ class Parameters:
 
 
 def read_declaration(at: At) -> Declared:
-    """Reads a `ParameterDeclaration`; raises `ConfigError` if its name, type or value is wrong."""
+    """Reads a `ParameterDeclaration`; raises `ConfigError` for its name, type or value."""
     name, kind = at.element.attribute("name") or "", at.element.attribute("parameterType") or ""
     value = at.element.attribute("value")
     if not re.fullmatch(rf"[A-Za-z_]\w{{0,{_LONGEST_WORD - 1}}}", name, re.ASCII):
@@ -229,7 +229,7 @@ def read_declaration(at: At) -> Declared:
 
 
 def words_of(texts: Iterable[str]) -> dict[str, str]:
-    """Returns a word for each text, no two alike; of a path, the file's name without its ending."""
+    """Returns a unique word for each text, for a path its stem."""
     words = dict[str, str]()
     for text in texts:
         name = re.sub(r"^.*[/\\]|\.xodr$", "", text) or "none"
@@ -253,7 +253,7 @@ _SIGNS: Mapping[str, tuple[str, ...]] = {
 
 
 def constraints_of(parameters: Parameters) -> list[Constraint]:
-    """Returns the constraints between numbers that vary; raises `ConfigError` if a constant breaks its own."""
+    """Returns constraints between varying numbers; raises `ConfigError` if a constant breaks its."""
     return [constraint for declared in parameters.declared.values() for constraint in _of(declared, parameters)]
 
 

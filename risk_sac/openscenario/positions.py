@@ -43,7 +43,7 @@ class Positions:
         """Element → model, and what reads its fields but the heading."""
 
     def position(self, at: At) -> places.Position:
-        """Reads the only child of an element `Position`, or of one that takes its place.
+        """Reads the only child of a `Position` or an equivalent element.
 
         Raises:
           ConfigError: it is wrong.
@@ -94,7 +94,7 @@ class Positions:
     # Routes
 
     def route(self, holder: At) -> Text:
-        """Collects the route that an element has as a child or names; returns its name."""
+        """Collects an element's child route or named route; returns its name."""
         return self._collected(holder, "Route", self.routes, self._route)
 
     def _route(self, at: At) -> places.RoutePath:
@@ -107,7 +107,7 @@ class Positions:
     # Trajectories
 
     def trajectory(self, holder: At) -> Text:
-        """Collects the trajectory that an element has as a child or names; returns its name."""
+        """Collects an element's child trajectory or named trajectory; returns its name."""
         return self._collected(holder, "Trajectory", self.trajectories, self._trajectory)
 
     def _trajectory(self, at: At) -> places.Trajectory:
@@ -199,7 +199,7 @@ def _lane(at: At) -> dict[str, Any]:
 
 
 def _kept(into: dict[str, Any], name: str, path: Any) -> str:
-    """Keeps a route or trajectory under its name, or a free one; returns the name."""
+    """Keeps a path under its name or a free one; returns that."""
     number, unique = 2, name[:190] or "unnamed"
     while unique in into and into[unique] != path:
         unique, number = f"{name[:190]} {number}", number + 1
@@ -208,7 +208,7 @@ def _kept(into: dict[str, Any], name: str, path: Any) -> str:
 
 
 def _check_times(at: At, vertices: list[places.Vertex]) -> None:
-    """Refuses times that go backwards, as far as they are constants, or that only some points have."""
+    """Refuses constant times that go backwards, and times of only some points."""
     times = [vertex.time_s for vertex in vertices]
     if any(time is None for time in times) and any(time is not None for time in times):
         raise at.refusal("times at some vertices", "a time at each vertex, or at none")

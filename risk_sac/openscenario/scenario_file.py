@@ -1,4 +1,4 @@
-"""Imports a scenario file, or a variation file with the scenario that it names, as a document."""
+"""Imports a scenario file, or variation with its scenario, as a document."""
 
 import math
 import re
@@ -42,7 +42,7 @@ class RoadFiles:
 
 @dataclass(frozen=True)
 class Imported:
-    """A scenario document with its files; its origin says what differs from the scenario file."""
+    """A scenario document with files; its origin lists differences from the source."""
 
     document: Scenario
     files: dict[str, bytes]
@@ -53,7 +53,7 @@ class Imported:
     """Of the grid that a variation file spans, with those that are left out; a range without a step counts once."""
 
     def located(self, error: ConfigError) -> ConfigError:
-        """Returns an error of the document with the place in the file that its path comes from."""
+        """Adds to a document's error the place in the source file."""
         path = next((path for path in self.places if error.field.startswith(path)), "")
         field = ": ".join(filter(None, (self.places.get(path, ""), error.field)))
         return ConfigError(field, error.got, error.expected, error.remedy)
@@ -131,7 +131,7 @@ class _Import:
         return [self._filtered(part, list(map(fits, part.rows)), "its constraints do not allow it") for part in varied]
 
     def _with_roads(self, varied: Sequence[Varied], at: At, scope: NameScope, file: Path) -> list[Varied]:
-        """Leaves out texts of a parameter that name roads which are not there; raises `ConfigError` if none is."""
+        """Drops words whose road is absent; raises `ConfigError` if none is left."""
         at = At(at.element, scope)
         text = at.text("filepath")
         absent = missing(at, text, self._sources, file)
@@ -238,7 +238,7 @@ def _start(entity: Entity, init: Init) -> Start:
 
 
 def _actor(entity: Entity, init: Init, *, moves: bool) -> Actor:
-    """Returns an actor; a bicycle on a trajectory moves freely, and what nothing moves is static."""
+    """Returns an actor: free for bicycles on trajectories, static if nothing moves."""
     follows = any(one.actor == entity.name and isinstance(one.do, FollowTrajectoryAction) for one in init.actions)
     freely = entity.freely or (entity.body == "bicycle" and follows)
     return entity.at.build(
@@ -270,7 +270,7 @@ _MOST_LINES = 10
 
 
 def unread(root: XmlElement) -> list[str]:
-    """Returns a line for each kind of element of a file that nothing read."""
+    """Returns a line for each kind of unread element of a file."""
     lines = defaultdict[str, list[int]](list)
     for element in _unused(root):
         lines[element.tag].append(element.line)
@@ -282,7 +282,7 @@ def unread(root: XmlElement) -> list[str]:
 
 
 def _unused(element: XmlElement) -> Iterator[XmlElement]:
-    """Yields elements that nothing read, within elements that were; other entries of a catalog do not count."""
+    """Yields unread elements within read ones, without other entries of catalogs."""
     for child in element.children:
         if child.used:
             yield from _unused(child)
@@ -295,7 +295,7 @@ _NET, _ROAD = ".net.xml", ".xodr"
 
 
 def missing(at: At, text: Text, sources: SourceFiles, file: Path) -> list[str]:
-    """Returns the road files of a parameter's words that are not there; raises `ConfigError` if none is."""
+    """Returns a parameter's absent road files; raises `ConfigError` if all are absent."""
     if not isinstance(text, Chosen):
         sources.find(text, file, at.element)
         return []
@@ -312,7 +312,7 @@ def missing(at: At, text: Text, sources: SourceFiles, file: Path) -> list[str]:
 
 
 def converted(at: At, text: Text, sources: SourceFiles, file: Path, remarks: list[str]) -> RoadFiles:
-    """Converts all roads that a scenario may be on; what a road loses is added to `remarks`.
+    """Converts all roads of a scenario; adds their losses to `remarks`.
 
     Raises:
       ConfigError: a road is not there, is no OpenDRIVE, or cannot be converted.

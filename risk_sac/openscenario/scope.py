@@ -1,4 +1,4 @@
-"""Attributes of elements as values: numbers, texts, and expressions as arithmetic of scenario documents.
+"""Attributes as numbers, texts, and expressions in the arithmetic of scenario documents.
 
 Truth values are 1 and 0: `a and b` is their minimum, `a or b` their maximum, and `not a` is 1 less it.
 Source: ASAM OpenSCENARIO XML 1.3, expressions.
@@ -49,7 +49,7 @@ class _Code(NamedTuple):
 
 
 def translated(text: str, name_of: Callable[[str], Expression]) -> Expression:
-    """Translates what stands between `${` and `}`, by what a parameter's name stands for in the document.
+    """Translates the content of `${…}`; `name_of` maps parameters to document expressions.
 
     Raises:
       ConfigError: it is no expression, or too long, or a name is unknown.
@@ -73,7 +73,7 @@ def translated(text: str, name_of: Callable[[str], Expression]) -> Expression:
 
 
 def simplest(text: str) -> Expression:
-    """Returns the number if an expression has no names, else the expression; raises `ConfigError`."""
+    """Returns the number of an expression without names, else it; raises `ConfigError`."""
     of_text = term(text)
     return text if of_text.names() else of_text.value({})
 
@@ -187,7 +187,7 @@ class NameScope:
         return NameScope(lambda name: own.get(name) or self._find(name), lambda: [*own, *self._names()])
 
     def name(self, name: str) -> Meaning:
-        """Returns what a name stands for; raises `ConfigError` if there is no such parameter."""
+        """Returns the meaning of a name; raises `ConfigError` for an unknown parameter."""
         if (meaning := self._find(name)) is None:
             remedy = did_you_mean(name, self._names()) or "declare it"
             raise ConfigError("", f"${name[:80]}, which is no parameter", "a declared parameter", remedy)
@@ -216,7 +216,7 @@ class NameScope:
 
 
 def text_of(value: Expression) -> str:
-    """Returns a number as a file would write it, a whole one without a fraction."""
+    """Returns a number as in a file: a whole one without fraction."""
     if isinstance(value, float) and value.is_integer():
         return str(int(value))
     return str(value)
@@ -248,14 +248,14 @@ class At:
         return meaning
 
     def number(self, name: str) -> Expression:
-        """Returns a number or arithmetic; raises `ConfigError` if it is missing or a word."""
+        """Returns a number or arithmetic; raises `ConfigError` if missing or a word."""
         meaning = self._required(name)
         if meaning.expression is None:
             raise self.refusal(f"{name}: {meaning.text[:80]!r}", "a number")
         return meaning.expression
 
     def combined(self, left: Expression, operator: str, right: Expression) -> Expression:
-        """Returns two values with an operator between them; raises `ConfigError` if that is no number."""
+        """Joins two values with an operator; raises `ConfigError` if not a number."""
         try:
             return combined(left, operator, right)
         except ConfigError as error:
@@ -298,7 +298,7 @@ class At:
         return value in ("true", "1")
 
     def one_of(self, name: str, table: Mapping[str, T], default: str | None = None) -> T:
-        """Returns what a word stands for in a table; raises `ConfigError` for another word."""
+        """Returns a word's value in a table; raises `ConfigError` for other words."""
         word = self.constant(name, default)
         if word not in table:
             got = f"{name}: {word[:80]!r}"
@@ -314,7 +314,7 @@ class At:
         return next(iter(self.all(*tags)), None)
 
     def one(self, *tags: str) -> "At":
-        """Returns the only child of some names; raises `ConfigError` if there is none or more."""
+        """Returns the only child with such a tag; raises `ConfigError` otherwise."""
         children = self.all(*tags)
         if len(children) != 1:
             got = f"{len(children)} children <{'> or <'.join(tags[:8])}>" if children else self._children()
@@ -322,7 +322,7 @@ class At:
         return children[0]
 
     def only(self, what: str) -> "At":
-        """Returns the only child, of any name; raises `ConfigError` with what there are in place of one."""
+        """Returns the only child of any tag; raises `ConfigError` otherwise."""
         children = self.element.children
         if len(children) != 1:
             raise self.refusal(f"{len(children)} {what}", "one")
@@ -343,7 +343,7 @@ class At:
         return self.element.refusal(got, expected, remedy)
 
     def unknown(self, what: str, name: str, known: Iterable[str]) -> ConfigError:
-        """Returns the error of a name that is none of those that are known."""
+        """Returns the error of a name that is not among the known."""
         names = list(known)
         wanted = f"one of {', '.join(names)}"[:500] if names else "none: there is none"
         return self.refusal(f"{what} {name[:80]!r}", wanted, did_you_mean(name, names))

@@ -31,7 +31,7 @@ Built = TypeVar("Built", bound=Settings)
 
 
 class Unread(ConfigError):
-    """Part of a scenario that is valid but not read; `effect` says what that means for an episode."""
+    """A valid but unread part; `effect` is the consequence for an episode."""
 
     def __init__(self, field: str, got: str, expected: str, effect: str) -> None:
         super().__init__(field, got, expected)
@@ -84,7 +84,7 @@ class XmlElement:
             child.use_all()
 
     def build(self, model: type[Built], **fields: Any) -> Built:
-        """Makes a model of what was read here, of its only kind; raises `ConfigError` with this place."""
+        """Builds a model, with its only kind; raises `ConfigError` with this place."""
         kinds = get_args(model.model_fields["kind"].annotation) if "kind" in model.model_fields else ()
         if len(kinds) == 1:
             fields["kind"] = kinds[0]
@@ -103,7 +103,7 @@ class XmlElement:
 
 
 def plain(text: str) -> str:
-    """Returns a text without characters that do not print, such as those that turn its direction."""
+    """Replaces unprintable characters, such as those that reverse the direction, by "?"."""
     return text if text.isprintable() else "".join(char if char.isprintable() else "?" for char in text)
 
 
@@ -221,7 +221,7 @@ class SourceFiles:
         return list(self._roots.values())
 
     def root(self, path: Path, place: str) -> XmlElement:
-        """Reads an OpenSCENARIO file, once; raises `ConfigError` for another root or an unknown version."""
+        """Reads an OpenSCENARIO file once; raises `ConfigError` for another root or version."""
         if path not in self._roots:
             root = parse(self.content(path, place), plain(path.name))
             if root.tag != ROOT:
@@ -263,7 +263,7 @@ def holds_scenario(upload: bytes) -> bool:
 
 
 def unpack(upload: bytes, folder: Path) -> Path:
-    """Unpacks an archive's scenario files into a folder; returns the file to import.
+    """Unpacks an archive's scenario files into a folder; returns the main file.
 
     Raises:
       ConfigError: it is damaged or too large, names files outside it, or has not one file to import.

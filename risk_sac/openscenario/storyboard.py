@@ -1,4 +1,4 @@
-"""The storyboard: where entities start, what they do, and when the episode ends."""
+"""The storyboard: entities' starts and actions, and the end of the episode."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -56,7 +56,7 @@ class Begun:
 
 @dataclass
 class Init:
-    """Element `Init`: starts of entities, by the document's names, and what else is done at time 0."""
+    """Element `Init`: entities' starts by document name, and actions at time 0."""
 
     starts: dict[str, Begun] = field(default_factory=dict)
     actions: list[InitAction] = field(default_factory=list)
@@ -81,7 +81,7 @@ class StoryboardReader:
     # Init
 
     def init(self, block: At) -> Init:
-        """Reads the element `Init`; raises `ConfigError` if an entity has no start, or one that is not read."""
+        """Reads `Init`; raises `ConfigError` for an entity without a readable start."""
         init = Init({entity.name: Begun() for entity in self._entities.all.values()})
         for holder in block.all("Actions"):
             for at in holder.all("GlobalAction"):
@@ -241,7 +241,7 @@ def _refuse_cycles(starts: Mapping[str, Begun], block: At) -> None:
 
 
 def moving_actors(init: Init, stories: Mapping[str, tuple[StoryAct, ...]]) -> set[str]:
-    """Returns the names of actors that start with a speed, or that an action moves or takes away."""
+    """Returns names of actors that start with speed, move or are removed."""
     names = {name for name, start in init.starts.items() if start.speed != 0.0}
     names |= {action.actor for action in init.actions}
     for group in (group for acts in stories.values() for act in acts for group in act.groups):
@@ -254,7 +254,7 @@ def moving_actors(init: Init, stories: Mapping[str, tuple[StoryAct, ...]]) -> se
 
 
 def horizon_of(stop: Trigger | None, remarks: list[str]) -> Expression:
-    """Returns the length of an episode: the first time that ends it alone."""
+    """Returns an episode's length: the first time that alone ends it."""
     times = list[Expression]()
     for group in stop or ():
         if len(group) == 1 and isinstance(condition := group[0], TimeCondition) and "greater" in condition.rule:

@@ -1,4 +1,4 @@
-"""The report of a campaign: finished runs in, comparison, tables and figures out.
+"""A campaign's report: comparison, tables and figures of its finished runs.
 
     runs = [read_run(folder) for folder in folders]
     comparison = compare(spec, runs, command)

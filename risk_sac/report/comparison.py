@@ -1,4 +1,4 @@
-"""The comparison of methods over seeds: cells, pairwise tests, and what they rest on. Pure."""
+"""Compares methods over seeds: cells, paired tests and their basis. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ def metrics_of(phase: Phase) -> tuple[Metric, ...]:
 
 
 class Cell(Counts):
-    """Results of a method in a family and phase, over its finished runs."""
+    """Results of a method in a family and phase, over finished runs."""
 
     family: FamilyName
     method: RunMethod
@@ -99,7 +99,7 @@ class Cell(Counts):
 
 
 def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
-    """Sums up the runs of one cell, at least one of them, all with episodes in the phase."""
+    """Sums up a cell's runs, one or more, all played in `phase`."""
     (family, method) = runs[0].cell
     metrics = [run.metrics[phase] for run in runs]
     counts = pooled_counts(metrics)
@@ -160,7 +160,7 @@ class Comparison:
 
     @property
     def headline(self) -> int | None:
-        """Headline failures of all searches; what several found alike counts once. None before one was replayed."""
+        """Counts distinct headline failures of all searches; None before any replay."""
         return pooled_headline(metrics for run in self.runs for metrics in run.metrics.values())
 
     @property
@@ -203,7 +203,7 @@ class Comparison:
         }
 
     def verified(self, cell: Cell) -> tuple[int, int] | None:
-        """Counts a cell's failures that replay to the bit, and those replayed; or None."""
+        """Counts a cell's failures repeated to the bit, and those replayed."""
         same = []
         for run in self.of_cell(cell.family, cell.method):
             if run.verified is None:
@@ -287,7 +287,7 @@ def _cells(runs: Sequence[FinishedRun]) -> Iterator[Cell]:
 
 
 def _tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
-    """Every other method against the first, corrected per family and phase: what was declared, and the rest."""
+    """Tests methods against the first per family and phase, declared ones apart."""
     phases: tuple[Phase, ...] = ("search", "evaluation") if spec.budget.evaluation_episodes else ("search",)
     for family in spec.families:
         by_method = _by_method(family, methods, runs)
@@ -304,12 +304,12 @@ def _tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[Fin
 
 
 def declared(test: PairedTest) -> bool:
-    """Whether it is of a hypothesis that was declared before any run, and so corrected apart."""
+    """Whether a test was declared before any run, and is corrected apart."""
     return test.reference == REFERENCE and test.method in RIVALS and test.metric in DECLARED
 
 
 def _paid_tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
-    """Tests our own search, or else the first method, against every other one, corrected per family."""
+    """Tests our own search, or the first method, against others, by family."""
     first = PAID_REFERENCE if PAID_REFERENCE in methods else methods[0]
     for family in spec.families:
         values = {

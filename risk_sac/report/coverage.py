@@ -123,7 +123,7 @@ class Coverage(Record):
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A parameter and its bins; each holds its lower edge, the last one both."""
+    """A parameter and its bins: half-open, the last one closed."""
 
     parameter: Parameter
     names: tuple[str, ...]  # of the bins: a category, or a range in the parameter's unit
@@ -136,7 +136,7 @@ class Axis:
 
 
 def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
-    """Divides the range of a parameter, as the ODD bounds it, into bins.
+    """Divides a parameter's range within the ODD into bins.
 
     A category is a bin: the halves of `whole`, the same as its family has it. So is a single value.
     """
@@ -174,7 +174,7 @@ def _alternatives(family: Family, parameter: Parameter) -> Axis | None:
 
 
 def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Coverage:
-    """Count what these episodes looked at; those from before the family had all its parameters are left out."""
+    """Counts covered bins of episodes; skips those that lack a current parameter."""
     whole = intersect(family.odd, odd)
     every = with_environment(family.space, odd, whole)
     space = narrow(every, whole)

@@ -107,14 +107,14 @@ class FamilyCoverage(Record):
 
     @property
     def never_bins(self) -> Mapping[str, Sequence[str]]:
-        """Parameter → its bins without an episode of either phase; parameters without such a bin are left out."""
+        """Parameter → its bins without an episode of either phase, if any."""
         both = zip(*(phase.parameters for phase in self.phases.values()), strict=True)
         never = {one.name: [name for name in one.never if all(name in of.never for of in more)] for one, *more in both}
         return {name: bins for name, bins in never.items() if bins}
 
     @property
     def never_cells(self) -> Mapping[tuple[str, str], Sequence[str]]:
-        """Pair of parameters → its cells without an episode of either phase, the most first."""
+        """Pair of parameters → its cells without an episode, most cells first."""
         both = zip(*(phase.pairs for phase in self.phases.values()), strict=True)
         never = {
             one.parameters: [cell for cell in one.never if all(cell in of.never for of in more)] for one, *more in both
@@ -255,7 +255,7 @@ CARD_TIMES = ".collision // empty | {conflict_to_contact_s: (.time_s - .judgemen
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """Places of the runs and commands to type, known to the caller only."""
+    """Runs' folders and commands to type, known only to the caller."""
 
     report: str  # the command that makes this report
     data: str  # the command that writes all numbers of the report to report.json
@@ -294,7 +294,7 @@ class FailureGroup:
 def report_page(
     comparison: Comparison, evidence: CampaignEvidence, origin: Origin, power: Power, layout: Layout
 ) -> str:
-    """Renders the whole report of the runs that have finished; `power` is that of their budget."""
+    """Renders the report of all finished runs; `power` is their budget's."""
     families, lost = _families(comparison.spec)
     return render(
         "report",
@@ -315,7 +315,7 @@ def report_page(
 
 
 def show_command(folder: Path, failure: str) -> str:
-    """Returns the command that draws a failure of the run in a folder."""
+    """Returns the command that draws a failure of a run's folder."""
     return shlex.join(["risk-sac", "show", str(folder), failure, "--out", "failure.png"])
 
 
@@ -332,7 +332,7 @@ def _families(spec: CampaignSpec) -> tuple[Mapping[FamilyName, Family], Mapping[
 
 
 def _odd(spec: CampaignSpec, families: Mapping[FamilyName, Family]) -> Mapping[str, list[str]]:
-    """Returns what each family and the campaign allow together, by field of the ODD."""
+    """Returns what families and campaign allow together, by ODD field."""
     odds = [intersect(family.odd, spec.odd) for family in families.values()]
     return {path: [allowed(odd_field(odd, path)) for odd in odds] for path in (paths(odds[0]) if odds else ())}
 
@@ -358,7 +358,7 @@ def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[F
 
 
 def _draw(run: FinishedRun, folder: Path | None, record: EpisodeRecord) -> Drawing:
-    """Draws a failure from above, or says what is missing; `folder` is its run's."""
+    """Draws a failure from above, or says what its run's `folder` lacks."""
     if folder is None:
         return Drawing(None, "the folder of its run is missing")
     try:

@@ -60,7 +60,7 @@ def look_of(method: RunMethod) -> Look:
 
 
 def draw(comparison: Comparison, figure: FamilyCurves | Times | Bars, formats: Sequence[Format]) -> list[bytes]:
-    """One figure as a file of each format; the same comparison gives the same bytes."""
+    """Returns a figure's files by format; equal comparisons give equal bytes."""
     return picture(partial(_draw, comparison, figure), formats, DPI, STYLE)
 
 

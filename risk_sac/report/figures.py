@@ -22,7 +22,7 @@ TIMED_S, TIMES = 30.0, 121  # processor time that is drawn, and at how many poin
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A figure over the episodes of the search, or over the processor time it took."""
+    """A figure over the search's episodes, or over its processor time."""
 
     name: str
     label: str
@@ -50,7 +50,7 @@ class Curve:
 
 
 def window_ecr(run: FinishedRun) -> Floats:
-    """ECR over the newest `WINDOW` episodes, after each episode; over all while there are fewer."""
+    """Returns ECR after each episode over the newest `WINDOW`, or fewer."""
     return _window_rate(run, lambda record: record.collision is not None and record.collision.valid)
 
 
@@ -60,7 +60,7 @@ def window_pcr(run: FinishedRun) -> Floats:
 
 
 def _window_rate(run: FinishedRun, counted: Callable[[EpisodeRecord], bool]) -> Floats:
-    """After each episode, of the newest in which the ego drove; 0 before the first of them."""
+    """Returns the rate after each episode over the newest driven episodes."""
     driven = [record.outcome is not Outcome.INVALID for record in run.phase("search")]
     happened = [counted(record) for record in run.phase("search") if record.outcome is not Outcome.INVALID]
     total, after = np.concatenate(([0], np.cumsum(happened))), np.cumsum(driven)
@@ -133,7 +133,7 @@ def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
 
 
 def figure_files(comparison: Comparison, name: str, formats: Sequence[Format] = FORMATS) -> list[bytes]:
-    """One figure as a file of each format; the same comparison gives the same bytes."""
+    """Returns a figure's files by format; equal comparisons give equal bytes."""
     figures = _figures(comparison)
     if name not in figures:
         raise ConfigError("", f"{name!r}", f"one of {', '.join(figures) or 'none: no run has finished'}")
@@ -145,7 +145,7 @@ def figure_files(comparison: Comparison, name: str, formats: Sequence[Format] = 
 def curve_values(
     comparison: Comparison, family: FamilyName, curve: Curve
 ) -> Iterator[tuple[MethodName, Floats, Floats]]:
-    """The methods of a figure, where they are drawn, `n`, and their runs' values there, `runs x n`."""
+    """Yields methods, drawn places, `n`, and values there, `runs x n`."""
     for method in comparison.methods:
         runs = comparison.of_cell(family, method)
         if runs and curve.methods(method) and (not curve.timed or all(map(cpu_s, runs))):

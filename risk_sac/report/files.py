@@ -1,4 +1,4 @@
-"""Reads the runs of a campaign from folders, and writes their comparison: JSON, CSV, Markdown and figures."""
+"""Reads a campaign's runs; writes their comparison as JSON, CSV, Markdown, figures."""
 
 import contextlib
 import csv
@@ -161,7 +161,7 @@ def table_csv(comparison: Comparison) -> str:
 
 
 def _by_name(cell: Cell) -> dict[str, Any]:
-    """A column per severity, fault and what drove, and per figure of each reference driver and requirement."""
+    """Columns per severity, fault, driver, and figure of reference drivers and requirements."""
     columns: dict[str, Any] = {f"severity.{each}": cell.by_severity.get(each, 0) for each in Severity}
     for name in ("episodes_driven_by", "headline_driven_by"):
         columns |= {f"{name}.{each}": getattr(cell, name).get(each, 0) for each in DrivenBy}
@@ -197,7 +197,7 @@ class Inputs:
 
 
 def read_folders(paths: Sequence[Path]) -> Inputs:
-    """Reads runs, and says why those are missing that are not finished, not there, or damaged.
+    """Reads runs, and says why unfinished, absent or damaged ones are missing.
 
     The paths are one folder of `risk-sac evaluate`, or runs that share all but family, method, seed and budget.
 
@@ -227,7 +227,7 @@ def run_folders(paths: Sequence[Path]) -> tuple[Path, ...]:
 
 
 def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, RunResults]]:
-    """Reads the campaign of some folders, and the results of its runs by folder; see `read_folders`."""
+    """Reads the campaign of folders, and its results by folder; see `read_folders`."""
     whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
     if whole is None:
         results = {path: read_results(path) for path in paths}
@@ -348,7 +348,7 @@ def inputs_in(text: str) -> SignedInputs:
 
 
 def changes(report: SignedInputs, now: SignedInputs) -> Sequence[str]:
-    """Names the inputs that changed since a report, are missing or are new; empty if none."""
+    """Names inputs changed, missing or new since a report; empty if none."""
     before, after = ({one.name: one.sha256 for one in inputs.inputs} for inputs in (report, now))
     words = []
     for name in sorted(before.keys() | after.keys()):

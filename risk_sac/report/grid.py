@@ -1,4 +1,4 @@
-"""The standard's verdict on each scene of a run that plays a scenario as it is written.
+"""The standard's verdict on each scene of a scenario played as written.
 
 A scene passes where the ego does not fail. Where it does, the regulation asks more than it may if a competent driver
 would not have avoided the contact either: such a scene is out of scope.
@@ -40,7 +40,7 @@ class StandardVerdict(StrEnum):
 
 
 class PlayedPoint(Record):
-    """A scene, how it ended for the ego, and what the standard says of it."""
+    """A scene, its outcome for the ego, and the standard's verdict."""
 
     id: str
     """Of the episode."""
@@ -80,7 +80,7 @@ class PlayedGrid(Record):
 
 
 def played_grids(paths: Sequence[Path], standard: Standard = "r157") -> tuple[PlayedGrid, ...]:
-    """Reads the scenes of runs, finished or not; of campaigns' folders, those of methods that play a story.
+    """Reads scenes of story runs, finished or not, alone or in campaigns.
 
     Raises:
       ConfigError: there is no such run.
@@ -157,7 +157,7 @@ def varied_of(points: Sequence[PlayedPoint]) -> list[str]:
 
 
 def varied_axes(grids: Sequence[PlayedGrid]) -> tuple[str, str]:
-    """The first two parameters of which scenes have several values; raises `ConfigError` if there are fewer."""
+    """Returns the first two parameters that vary; raises `ConfigError` for fewer."""
     varied = varied_of([point for grid in grids for point in grid.points])
     if len(varied) < 2:
         raise ConfigError("over", f"{len(varied)} parameters that vary", "two, for a picture")
@@ -165,7 +165,7 @@ def varied_axes(grids: Sequence[PlayedGrid]) -> tuple[str, str]:
 
 
 def named_values(scene: Mapping[str, float], parameters: Mapping[str, ScenarioParameter]) -> dict[str, float | str]:
-    """Parameter → number, or word, of a scene; rows by the names of their columns."""
+    """Parameter → a scene's number or word; rows by their columns' names."""
     values: dict[str, float | str] = {}
     for name, value in scene.items():
         parameter = parameters.get(name)
@@ -180,7 +180,7 @@ def named_values(scene: Mapping[str, float], parameters: Mapping[str, ScenarioPa
 
 
 def grid_csv(grids: Sequence[PlayedGrid]) -> str:
-    """A row for each scene; parameters that a run does not have are empty."""
+    """Returns CSV: a row per scene, empty where a run lacks parameters."""
     names = dict.fromkeys(name for grid in grids for point in grid.points for name in point.values)
     own = ("outcome", "reason", "kind", "grade", "r157", "fsm", "verdict")
     text = io.StringIO()

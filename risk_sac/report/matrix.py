@@ -112,7 +112,7 @@ def coverage_matrix(
 
 
 def merged(matrices: Sequence[CoverageMatrix]) -> CoverageMatrix:
-    """Merges the matrices of different campaigns cell by cell; parameters of unlike ranges stay apart."""
+    """Merges campaigns' matrices cell by cell; parameters with unlike ranges stay apart."""
     if len(matrices) < 2:
         return matrices[0] if matrices else _matrix((), tuple(_groups({}, {}, "", {})), (), ())
     campaigns = tuple(campaign for matrix in matrices for campaign in matrix.campaigns)
@@ -129,7 +129,7 @@ def merged(matrices: Sequence[CoverageMatrix]) -> CoverageMatrix:
 
 
 def definitions_of(records: Sequence[EpisodeRecord]) -> tuple[int, ...]:
-    """Returns the versions of the definitions that contacts and violations were judged by."""
+    """Returns the definition versions that contacts and violations were judged by."""
     contacts = {record.collision.judgement.definitions for record in records if record.collision is not None}
     return tuple(sorted(contacts | {violation.definitions for record in records for violation in record.violations}))
 
@@ -164,7 +164,7 @@ def _count_requirements(counts: Mapping[standards.CellKey, _Count], family: str,
 def _power(
     comparison: Comparison, family: FamilyName, id_: str, benchmark: Sequence[BenchmarkRun] | None
 ) -> CellPower | None:
-    """Returns what the campaign's best method finds in one scenario; None where nothing was measured."""
+    """Returns what the best method finds in a scenario; None if unmeasured."""
     spec = comparison.spec.model_copy(update={"families": (family,)})
     played = [one for one in played_by(comparison.runs) if one.family == family]
     methods = [one for one in power_of(spec, played, benchmark).methods if one.defects]
@@ -271,7 +271,7 @@ def _cell(
     power: CellPower | None,
     unplayed: str = "never played",
 ) -> CoverageCell:
-    """Returns a cell with its state, and that in words; `unplayed` are those of one without an episode."""
+    """Returns a cell with state and note (`unplayed` without an episode)."""
     played, failed, reached = count.played, count.failed, count.reached
     state = CellState.FAILED if failed else CellState.PLAYED if played else CellState.NEVER
     if reached == 0 and not failed:

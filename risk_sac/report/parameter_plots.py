@@ -1,4 +1,4 @@
-"""Pictures over the parameters of a scenario: an ego's boundary, and the standard's verdicts."""
+"""Pictures over scenario parameters: an ego's boundary, and the standard's verdicts."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -37,7 +37,7 @@ def write_boundary(folder: Path, found: BoundaryMap) -> None:
 
 
 def boundary_png(found: BoundaryMap) -> bytes:
-    """Draws the ego's probability of failing, its points and all boundaries; equal maps give equal bytes.
+    """Draws failing probability, points and boundaries; equal maps give equal bytes.
 
     Of three or four axes it draws a panel for each level of the third and fourth.
     """
@@ -94,7 +94,7 @@ def _map_panel(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:
 
 
 def _slice_words(axis: BoundaryAxis, level: int) -> str:
-    """A panel's level of an axis, and the range of the points in it, as `_nearest` sorts them."""
+    """Formats a panel's level of an axis, and its points' range (`_nearest`)."""
     between = [(left + right) / 2 for left, right in pairwise(axis.levels)]
     low, high = (axis.low, *between)[level], (*between, axis.high)[level]
     return f"{axis.name} = {axis.levels[level]:.4g} (points: {low:.4g} to {high:.4g})"
@@ -108,7 +108,7 @@ def _values(found: BoundaryMap, driver: DriverMap, cut: tuple[int, ...]) -> Floa
 
 
 def _scatter(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:
-    """Draws the points that belong to a panel: those nearest to its levels."""
+    """Draws a panel's points: those nearest to its levels."""
     points = [point for point in found.points if _nearest(found, point.values[2:]) == cut]
     looks: Sequence[tuple[bool | None, str, str, str]] = (
         (True, FAILS, "s", "ego fails"),
@@ -141,7 +141,7 @@ DRIVERS: Mapping[str, tuple[str, str, str]] = {  # words, colour, dashes
 
 
 def grid_png(grids: Sequence[PlayedGrid], over: tuple[str, str], at: Mapping[str, str]) -> bytes:
-    """Draws the scenes of some runs over two parameters; equal runs give equal bytes.
+    """Draws the runs' scenes over two parameters; equal runs give equal bytes.
 
     A place has the worst verdict of its scenes. The lines are where a driver avoids half of them. `at` has values of
     other parameters, as text; scenes with other values are left out.
@@ -237,7 +237,7 @@ def _coordinate(value: float | str, words: Sequence[str]) -> float:
 
 
 def _shares(places: Mapping[tuple[float, float], Sequence[PlayedPoint]], driver: str) -> Floats:
-    """Places and the share of their scenes that a driver avoids, `n x 3`."""
+    """Returns places and shares of scenes a driver avoids, `n x 3`."""
     rows = []
     for (x, y), here in places.items():
         avoided = [outcome for point in here if (outcome := getattr(point, driver)) is not None]
@@ -247,7 +247,7 @@ def _shares(places: Mapping[tuple[float, float], Sequence[PlayedPoint]], driver:
 
 
 def _bound(axes: Axes, shares: Floats, label: str, colour: str, dashes: str) -> None:
-    """Draws where a driver avoids half of the scenes, if it avoids some."""
+    """Draws where a driver avoids half of the scenes, if any."""
     if len(shares) < 4 or np.ptp(shares[:, 2]) == 0.0 or min(len(set(shares[:, i])) for i in (0, 1)) < 2:
         return
     low, width = shares[:, :2].min(axis=0), np.ptp(shares[:, :2], axis=0)

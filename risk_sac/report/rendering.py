@@ -1,4 +1,4 @@
-"""Renders pages from templates, each as HTML or Markdown, and formats their numbers.
+"""Renders pages from templates as HTML or Markdown, and formats their numbers.
 
 A content template (`comparison.jinja`, `report.jinja`) calls the blocks of a layout (`html.jinja`, `markdown.jinja`).
 Text that a template inserts is escaped for the layout; a template's own text is not.
@@ -120,7 +120,7 @@ def _visible(value: object) -> object:
 
 
 def _plain(value: object) -> Markup:
-    """Escapes text for Markdown: it is on one line, and nothing in it is a mark or HTML."""
+    """Escapes text for Markdown: one line without marks or HTML."""
     if isinstance(value, Markup):
         return value
     text = " ".join(str(_visible(value)).split()).translate(_TAGS)
@@ -128,25 +128,25 @@ def _plain(value: object) -> Markup:
 
 
 def fenced(text: str) -> Markup:
-    """Returns a block of code in a fence longer than any within it."""
+    """Returns a block of code in a fence longer than any inside."""
     text = str(_visible(text)).strip()
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
     return Markup(f"{fence}\n{text}\n{fence}")
 
 
 def inline(svg: bytes) -> str:
-    """Returns a picture's address; as an image, an SVG can run nothing and load nothing."""
+    """Returns a picture's data address; an SVG image runs and loads nothing."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 def again(spec: RunSpec, spec_file: str) -> str:
-    """Returns the command that repeats a run of the campaign in a file."""
+    """Returns the command that repeats a run of the campaign in `spec_file`."""
     picked = ["--scenario", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
     return shlex.join(["risk-sac", "run", "--spec", spec_file, *picked, "--out", "repeated"])
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    """Returns a table in Markdown; the first columns hold words, the others numbers."""
+    """Returns a Markdown table: `left` columns of words, then numbers."""
     rule = ["---" if place < left else "---:" for place in range(len(columns))]
     lines = [columns, rule, *rows]
     return "\n".join(f"| {' | '.join(_cell(cell) for cell in line)} |" for line in lines) + "\n"
@@ -157,7 +157,7 @@ def _cell(text: str) -> str:
 
 
 def interval(low: float | None, high: float | None, format_: str = ".3f") -> str:
-    """Formats an interval to stand behind a number; empty where there is none."""
+    """Formats an interval to follow a number; empty without one."""
     return "" if low is None or high is None else f" [{low:{format_}}, {high:{format_}}]"
 
 
@@ -182,7 +182,7 @@ def symbol(name: str) -> str:
 
 
 def estimate(value: Estimate, runs: int) -> str:
-    """Formats a mean over seeds with its interval; says over how many where not over all."""
+    """Formats a mean over seeds with interval, and how many if partial."""
     if value.mean is None:
         return DASH
     text = f"{value.mean:.3f}{interval(value.low, value.high)}"
@@ -190,7 +190,7 @@ def estimate(value: Estimate, runs: int) -> str:
 
 
 def shares(counts: Mapping[str, int], names: Sequence[str]) -> list[str]:
-    """Formats each name's count and its share of all counts; a dash where there are none."""
+    """Formats names' counts and shares of all counts; dashes without counts."""
     judged = sum(counts.values())
     return [f"{counts.get(name, 0)} ({percent(counts.get(name, 0) / judged, 0)})" if judged else DASH for name in names]
 
@@ -201,7 +201,7 @@ def spreads(runs: Sequence[Found]) -> list[str]:
 
 
 def drivers(rates: Mapping[str, DriverPcr], names: Sequence[str]) -> list[str]:
-    """Formats the PCR of each reference driver; a dash for one that judged no contact."""
+    """Formats each reference driver's PCR; a dash if it judged no contact."""
     told = [rates.get(name) for name in names]
     return [f"{rate.pcr:.3f}{interval(rate.pcr_low, rate.pcr_high)}" if rate else DASH for rate in told]
 
@@ -210,7 +210,7 @@ _CPU_INFO = Path("/proc/cpuinfo")
 
 
 def this_platform() -> Mapping[str, str]:
-    """Architecture, processor and Python of this machine: what seconds, and the last bits of a digest, depend on."""
+    """Returns architecture, processor and Python, which affect seconds and digests' last bits."""
     return {"machine": platform.machine(), "cpu": _cpu(), "python": platform.python_version()}
 
 

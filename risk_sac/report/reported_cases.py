@@ -1,4 +1,4 @@
-"""Builds the test cases of a campaign, one for each scenario, after ISO 34505."""
+"""Builds a campaign's test cases, one per scenario, after ISO 34505."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -72,7 +72,7 @@ def reported_cases(
     estimates: Mapping[FamilyName, tuple[assessment.CaseEstimate, ...]],
     people: Mapping[TriageState, int] | None,
 ) -> Iterator[assessment.ReportedCase]:
-    """Yields a test case for each scenario of a campaign that can still be read.
+    """Yields a test case for each readable scenario of a campaign.
 
     `estimates` are bounds of the i.i.d. phases; `people`, failures by what people made of them, or None if not known.
     """

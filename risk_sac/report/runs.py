@@ -1,4 +1,4 @@
-"""Finished runs as the report reads them: findings within a budget, ways to play, and kinds of failures."""
+"""Finished runs for the report: findings within budgets, play modes, failure kinds."""
 
 import math
 from collections import defaultdict
@@ -35,7 +35,7 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class FinishedRun:
-    """Everything the report says of a run follows from its records; processor time apart."""
+    """A run's records, from which its report follows, and its processor time."""
 
     spec: RunSpec
     digest: str  # of the records
@@ -146,7 +146,7 @@ def episodes(run: FinishedRun) -> Sequence[float]:
 
 
 def cpu_s(run: FinishedRun) -> Sequence[float]:
-    """Processor time to the end of each search episode, s; empty where it was not measured."""
+    """Returns processor time to each search episode's end, s; empty if unmeasured."""
     return run.episode_cpu_s[: len(run.phase("search"))]
 
 
@@ -202,7 +202,7 @@ class FailureOrigin(Record):
 
 
 def played_as(method: RunMethod) -> PlayedAs | None:
-    """Returns what a method changes of a scenario; None of a control without a story."""
+    """Returns what a method changes of a scenario; None for storyless controls."""
     row = method_of(method)
     if row.story:
         return PlayedAs.AS_WRITTEN if row.scenes == "grid" else PlayedAs.SEARCHED
@@ -210,7 +210,7 @@ def played_as(method: RunMethod) -> PlayedAs | None:
 
 
 def failure_origins(runs: Sequence[FinishedRun]) -> tuple[FailureOrigin, ...]:
-    """The failures of scenarios that some method plays as they are written; of others nothing."""
+    """Returns failures of scenarios that some method plays as written."""
     families = dict.fromkeys(run.spec.family for run in runs if method_of(run.spec.method).story)
     return tuple(row for family in families for row in _of_family([run for run in runs if run.spec.family == family]))
 
@@ -280,7 +280,7 @@ class Cluster(Record):
 
 
 class Overview(Record):
-    """All clusters, the largest number of preventable failures first, and how various they are."""
+    """Clusters, most preventable failures first, and how various they are."""
 
     clusters: tuple[Cluster, ...]
     vendi: float
@@ -335,7 +335,7 @@ def _rank(member: _Member) -> tuple[int, float, int]:
 
 
 def _features(violation: Collision | Violation) -> Floats:
-    """Outcome features, scaled to [0, 1]; a violation without contact has the ego's speed and the robustness alone."""
+    """Returns outcome features in [0, 1]; without contact, speed and robustness only."""
     if isinstance(violation, Collision):
         return outcome_features(violation)
     scaled: Floats = np.clip([violation.ego_speed_mps / SPEED_MPS, violation.robustness / LEAST], 0.0, 1.0)
@@ -343,7 +343,7 @@ def _features(violation: Collision | Violation) -> Floats:
 
 
 def vendi(clusters: Sequence[Sequence[Collision | Violation]]) -> float:
-    """Returns the Vendi score of failures; those in different clusters have nothing in common.
+    """Returns failures' Vendi score; different clusters have nothing in common.
 
     Within a cluster, similarity falls with the distance of their outcome features.
 

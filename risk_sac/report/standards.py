@@ -1,4 +1,4 @@
-"""Tables that map what this product states to published standards, by number and title.
+"""Tables that map our statements to published standards, by number and title.
 
 Facts alone are taken over, no text. A clause is named by number where its number could be confirmed in a public table
 of contents, else by title.
@@ -157,7 +157,7 @@ TRAFFIC_RULES = (
 
 
 class Clause(NamedTuple):
-    """A field of a test case, and the clause of a standard for it."""
+    """A test case's field and the clause of a standard for it."""
 
     field: str
     standard: str
@@ -219,7 +219,7 @@ class SceneFacts:
         self.space: SceneSpace = narrow(with_environment(own.space, odd, self.odd), self.odd)
 
     def cells(self, scene: Mapping[str, float]) -> set[CellKey]:
-        """Returns the cells that a scene lies in, parameters and requirements apart; the same cell once."""
+        """Returns a scene's distinct cells, without those of parameters and requirements."""
         value = self._interpreter.value(scene)
         cells = {*self._of_scenario, *self._conditions(scene)}
         speeds = {"initial speed": [value.of(self._document.ego.speed)]}
@@ -275,20 +275,20 @@ class SceneFacts:
             yield CellKey("odd", row, band_of(row, scene[VISIBILITY]))
 
     def _half(self, parameter: Parameter, scene: Mapping[str, float]) -> int:
-        """Returns the half of a parameter's own range that a scene lies in: 0 or 1."""
+        """Returns the scene's half of a parameter's own range: 0 or 1."""
         own = next(one for one in self._interpreter.space.parameters if one.name == parameter.name)
         return int(scene[own.name] >= (own.low + own.high) / 2)
 
 
 def band_of(row: str, number: float) -> str:
-    """Returns the band of an attribute that a number lies in; beyond the edges the nearest one."""
+    """Returns a number's band of an attribute; beyond the edges the nearest."""
     edges = BANDS[row]
     place = int(np.clip(np.searchsorted(edges, number, side="right") - 1, 0, len(edges) - 2))
     return f"{edges[place]:g} to {edges[place + 1]:g}"
 
 
 def _within(row: str, allowed: Interval) -> str:
-    """Returns the band of an interval, or the interval itself where it has several."""
+    """Returns an interval's band, or the interval where it has several."""
     bands = {band_of(row, allowed.low), band_of(row, allowed.high)}
     return bands.pop() if len(bands) == 1 else f"within {allowed.low:.4g} to {allowed.high:.4g}"
 

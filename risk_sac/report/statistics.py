@@ -1,4 +1,4 @@
-"""Two methods against each other, runs paired by seed, and how many known defects a budget detects.
+"""Compares methods on runs paired by seed; estimates a budget's detected defects.
 
 Source: Arcuri & Briand 2014, A hitchhiker's guide to statistical tests for assessing randomized algorithms in
 software engineering: report an effect size beside every p-value.
@@ -98,7 +98,7 @@ DECIMALS = 12  # beyond which two differences are the same
 
 
 def wilcoxon_p(differences: Sequence[float]) -> float:
-    """Exact two-sided p of Wilcoxon's signed-rank test, in (0, 1]; 1 where no difference is left.
+    """Exact two-sided p of Wilcoxon's signed-rank test; 1 without any difference.
 
     Under the null hypothesis each |difference| is as likely to be positive as negative. The distribution of the rank
     sum is counted over all 2^n signs, with the mid-ranks that the differences have, so ties keep it exact.
@@ -123,7 +123,7 @@ def wilcoxon_p(differences: Sequence[float]) -> float:
 
 
 def smallest_p(pairs: int) -> float:
-    """The least p that `wilcoxon_p` can give for so many pairs: all differences on one side."""
+    """Returns `wilcoxon_p`'s least p for `pairs`: all differences on one side."""
     return min(1.0, 2 / (1 << pairs))
 
 
@@ -161,7 +161,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
-    """Computes A12: the chance that a first value exceeds a second one; ties count half.
+    """Computes A12: P(first value exceeds a second), where ties count half.
 
     Source: Vargha & Delaney 2000, A critique and improvement of the CL common language effect size statistics.
     """
@@ -171,7 +171,7 @@ def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
 
 
 def _doubled_ranks(values: NDArray[np.float64]) -> list[int]:
-    """Twice the mid-rank of each value, which is whole where a mid-rank ends in one half."""
+    """Returns twice each value's mid-rank, as mid-ranks may end in one half."""
     ordered = np.sort(values)
     below = np.searchsorted(ordered, values, side="left")
     up_to = np.searchsorted(ordered, values, side="right")
@@ -235,7 +235,7 @@ def runs_of(text: str) -> list[BenchmarkRun]:
 
 @cache
 def measured() -> Sequence[BenchmarkRun]:
-    """Returns the runs that are shipped; none until the benchmark is measured under the present definitions."""
+    """Returns the shipped runs; none without a benchmark under present definitions."""
     return runs_of(MEASURED.read_text(encoding="utf-8"))
 
 
@@ -246,7 +246,7 @@ def played_by(finished: "Sequence[FinishedRun]") -> list[PlayedCounts]:
 
 
 def power_of(spec: CampaignSpec, played: Collection[PlayedCounts], runs: Sequence[BenchmarkRun] | None = None) -> Power:
-    """Returns what the budget of a campaign is worth; says so where nothing was measured at all.
+    """Returns a campaign budget's power; says so if nothing was measured.
 
     Only what its searches have `played` counts, but where a method has none yet in a family. `runs` are the
     benchmark's; the shipped ones if None.
@@ -266,7 +266,7 @@ def power_of(spec: CampaignSpec, played: Collection[PlayedCounts], runs: Sequenc
 
 
 def _comparison(methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) -> str:
-    """Compares methods on equal terms: the defects and environment steps that all of them were measured with."""
+    """Compares methods on defects and environment steps common to all of them."""
     budgeted = [each for each in methods if each.budgets]
     if len(budgeted) < 2:
         return ""
@@ -289,7 +289,7 @@ def _comparison(methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) ->
 
 
 def _shared_steps(family: str, methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) -> int:
-    """Returns the most steps of a run that all methods may spend and were measured for."""
+    """Returns the most run steps allowed and measured for all methods."""
     measured_for: dict[tuple[str, str], int] = {}
     for run in runs:
         if run.family == family:
@@ -355,7 +355,7 @@ def _basis(found: Sequence[DefectPower]) -> Iterator[str]:
 def _budget(
     spec: CampaignSpec, family: str, method: str, played: Collection[PlayedCounts], runs: Sequence[BenchmarkRun]
 ) -> RunBudget:
-    """Returns the budget of a run, by the method's episodes of the campaign, or else of the benchmark."""
+    """Returns a run's budget by episodes of the campaign, else the benchmark."""
     cell = (family, method)
     own = [each for each in played if (each.family, each.method) == cell]
     begun = any(each.steps for each in own)

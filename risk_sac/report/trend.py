@@ -25,7 +25,7 @@ OF_EGO = {"profile", "driver", "label", "version"}  # the other fields of an ego
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedRun:
-    """A finished run of a campaign, as far as a trend reads it."""
+    """A finished run of a campaign, with the fields of a trend."""
 
     family: str
     method: str
@@ -68,7 +68,7 @@ class TrendRate(Record):
 
 
 class TrendArea(Record):
-    """Share of a box of scene parameters in which the ego fails and a reference driver does not."""
+    """Share of a parameter box where the ego, not the driver, fails."""
 
     family: str
     parameters: tuple[str, ...]
@@ -82,7 +82,7 @@ class TrendArea(Record):
 
 
 class TrendPoint(Record):
-    """Results of one version of the ego, from its newest campaign on these terms."""
+    """Results of one ego version, from its newest campaign on these terms."""
 
     version: str
     """`ego.label`, else the registered version, else that of libsumo."""
@@ -159,7 +159,7 @@ def driver_name(ego: EgoConfig) -> str:
 
 
 def trend(campaigns: Sequence[EndedCampaign], left_out: Iterable[LeftOut] = ()) -> Trend:
-    """Compares the versions of each ego; of campaigns, oldest first, the first places a version."""
+    """Compares each ego's versions, placed by their first campaign, oldest first."""
     rows: dict[tuple[str, str], list[EndedCampaign]] = {}
     order: dict[tuple[str, str], int] = {}
     for campaign in campaigns:
@@ -180,7 +180,7 @@ def trend(campaigns: Sequence[EndedCampaign], left_out: Iterable[LeftOut] = ()) 
 
 
 def check_scenarios(campaigns: Sequence[EndedCampaign]) -> None:
-    """Raises a ConfigError for campaigns that were chosen to be compared and are of different scenarios."""
+    """Raises a ConfigError if campaigns to compare differ in scenarios."""
     for campaign in campaigns[1:]:
         if set(campaign.spec.families) != set(campaigns[0].spec.families):
             differing = (f"{', '.join(sorted(each.spec.families))} in {each.id}" for each in (campaigns[0], campaign))
@@ -188,7 +188,7 @@ def check_scenarios(campaigns: Sequence[EndedCampaign]) -> None:
 
 
 def _terms(spec: CampaignSpec) -> CampaignSpec:
-    """Returns the spec without the ego, the label, `on_end`, the order of lists and the choice of seeds."""
+    """Returns the spec without ego, label, `on_end`, list order and seed choice."""
     return spec.model_copy(
         update={
             "label": "",
@@ -258,7 +258,7 @@ def _point(campaigns: Sequence[EndedCampaign]) -> TrendPoint:
 
 
 def _compared(points: Sequence[TrendPoint]) -> Iterator[TrendPoint]:
-    """Compares each version with those before it, back to the last change of the software."""
+    """Compares versions with earlier ones since the last change of software."""
     before: list[TrendPoint] = []
     for point in points:
         changed = tuple(
@@ -327,7 +327,7 @@ def _areas(boundary: BoundaryMap) -> Iterator[TrendArea]:
 
 
 def _settings(ego: EgoConfig) -> Iterator[str]:
-    """Says in which settings an ego differs from the defaults of its profile."""
+    """Yields an ego's settings that differ from its profile's defaults."""
     usual = dict(_flat(EgoConfig(profile=ego.profile).model_dump(mode="json")))
     filled_in = {"response_time_s"} if ego.driver else set()
     for name, value in _flat(ego.model_dump(mode="json", exclude=OF_EGO | filled_in)):

@@ -1,4 +1,4 @@
-"""Measures what vehicles and pedestrians do after the release, by the features of `risk_sac.risk.driving`."""
+"""Measures actors' behaviour after the release by the features of `risk_sac.risk.driving`."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -39,7 +39,7 @@ class Observed(NamedTuple):
 
 
 def observed_of(evidence: Evidence) -> list[Observed]:
-    """Lists the features of all adversaries that acted, that is moved, in the frames from the release on."""
+    """Lists the features of all adversaries that moved after the release."""
     observed: list[Observed] = []
     path = None
     released = int(np.searchsorted(evidence.time_s, -1e-6))
@@ -99,7 +99,7 @@ def _lines(
     within: Bools,
     others: tuple[Floats, Floats, Floats],
 ) -> Iterator[Observed]:
-    """Measures lane changes, and how long it keeps to a line or over it; outside junctions."""
+    """Measures lane changes and time near or over a line, outside junctions."""
     ahead_m, left_m, cos = others
     offset = e.lane_offset_m[frames, actor]
     over = np.abs(offset) + e.width_m[actor] / 2 - lane_m / 2
@@ -127,7 +127,7 @@ def _lines(
 def _new_follower(
     e: Evidence, actor: int, frames: NDArray[np.intp], at: int, beside_m: Floats, ahead_m: Floats, cos: Floats
 ) -> Iterator[Observed]:
-    """Measures the room that a lane change leaves to the next vehicle behind or beside."""
+    """Measures the room that a lane change leaves the next follower."""
     half_m = (e.length_m + e.length_m[actor]) / 2
     low, high = (share * e.ground.lane_width_m for share in BESIDE)
     there = (beside_m > low) & (beside_m < high) & (cos > SAME_WAY_COS) & (e.kind == Kind.VEHICLE)
@@ -150,7 +150,7 @@ def _new_follower(
 def _pacing(
     e: Evidence, actor: int, frames: NDArray[np.intp], ahead_m: Floats, left_m: Floats, cos: Floats
 ) -> tuple[float, float]:
-    """Finds the longest time level with another vehicle at its speed, and when it began."""
+    """Finds the longest pacing of a vehicle (level, same speed), and start."""
     speed = e.speed_mps[frames]
     level = np.abs(ahead_m) < (e.length_m + e.length_m[actor]) / 2
     level &= (np.abs(left_m) < 1.5 * e.ground.lane_width_m) & (cos > SAME_WAY_COS)
@@ -164,7 +164,7 @@ def _pacing(
 def _junctions(
     e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, others: tuple[Floats, Floats]
 ) -> Iterator[Observed]:
-    """Measures entries on red or without priority, and how long it stops or crawls in a junction."""
+    """Measures entries on red or without priority, and stops within a junction."""
     ahead_m, left_m = others
     link, speed = e.link[frames, actor], e.speed_mps[frames, actor]
     enters = (link[:-1] != 0) & ((link[1:] == 0) | (within[1:] & ~within[:-1])) & (speed[1:] > MOVES_MPS)
@@ -279,7 +279,7 @@ def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
 
 
 def smoothed(values: Floats, frames: int = SMOOTH) -> Floats:
-    """Computes the mean over each so many frames; empty if there are fewer."""
+    """Computes the moving mean over `frames` frames; empty if there are fewer."""
     if len(values) < frames:
         return np.empty(0)
     total = np.cumsum(np.concatenate(([0.0], values)))
@@ -288,7 +288,7 @@ def smoothed(values: Floats, frames: int = SMOOTH) -> Floats:
 
 
 def runs(does: Bools) -> list[tuple[int, int]]:
-    """Lists stretches in which a condition holds: the first frame and the one after the last."""
+    """Lists stretches of a condition: first frame, and frame after the last."""
     flags, found, last = does.tobytes(), [], 0  # ten times as fast as np.diff on arrays of an episode's length
     while (first := flags.find(1, last)) >= 0:
         last = flags.find(0, first)

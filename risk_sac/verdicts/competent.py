@@ -1,4 +1,4 @@
-"""Plays competent drivers in an episode of any outcome, for an ego that keeps on.
+"""Plays competent drivers in any episode, for an ego that keeps on.
 
 So the boundary of what a competent driver avoids runs through scenes that the ego itself passes, and is the same for
 all egos. The others move as they did in the recording, in which they may have reacted to the ego. A story may wait for
@@ -46,7 +46,7 @@ SAME_WAY = (ConflictType.CUT_IN, ConflictType.LEADER)
 
 
 def avoided_by(evidence: Evidence, way: Path) -> Mapping[str, bool]:
-    """Driver of `COMPETENT` → whether it avoids the first contact of an ego that keeps lane and speed.
+    """Driver of `COMPETENT` → whether it avoids a steady ego's first contact.
 
     Without such a contact there is nothing to avoid, and both do. A contact at the ego's rear is none of its own.
 
@@ -74,7 +74,7 @@ def avoided_by(evidence: Evidence, way: Path) -> Mapping[str, bool]:
 
 
 def becomes_dangerous(evidence: Evidence, striker: int, contact: int) -> int | None:
-    """Returns the frame in which a vehicle becomes a danger by the regulation, or None.
+    """Finds when a vehicle becomes dangerous by the regulation, or None.
 
     It does where it comes into the ego's way, or into sight, and the time to collision is 2 s at most after the 0.4 s
     of evaluation. It also does where it brakes harder than 5 m/s² in the ego's lane. Choice: with what is further
@@ -96,7 +96,7 @@ def becomes_dangerous(evidence: Evidence, striker: int, contact: int) -> int | N
 
 
 def keeping_on(evidence: Evidence, way: Path) -> Evidence:
-    """Returns the episode with an ego that keeps its lane and first speed."""
+    """Returns the episode with an ego that keeps lane and first speed."""
     first, more = first_act(evidence), round(BEYOND_S / evidence.step_s)
     e = _prolonged(evidence, more)
     lane = lane_path(evidence, evidence.released)
@@ -121,7 +121,7 @@ def keeping_on(evidence: Evidence, way: Path) -> Evidence:
 
 
 def first_act(evidence: Evidence) -> int:
-    """Returns the first frame in which another actor appears, moves across its lane, brakes or begins to move."""
+    """Returns when another actor first appears, moves sideways, brakes or starts."""
     e, since = evidence, slice(evidence.released, None)
     walks, stood = e.kind[1:] == Kind.PEDESTRIAN, e.speed_mps[e.released, 1:] < MOVES_MPS
     acts = (np.abs(e.lateral_mps[since, 1:]) > MOVES_MPS) & ~walks
@@ -132,7 +132,7 @@ def first_act(evidence: Evidence) -> int:
 
 
 def first_contact(evidence: Evidence) -> tuple[int, int] | None:
-    """Returns frame and column of the first contact that is not at the ego's rear."""
+    """Returns frame and column of the first contact not at the rear."""
     own, size, contacts = recorded_motion(evidence, 0), recorded_size(evidence, 0), []
     for other in range(1, len(evidence.ids)):
         motion = recorded_motion(evidence, other)
@@ -149,7 +149,7 @@ def first_contact(evidence: Evidence) -> tuple[int, int] | None:
 
 
 def _avoids(evidence: Evidence, striker: int, driver: int, first: int) -> bool:
-    """Whether a driver that looks out, or has perceived the danger, from a frame on avoids a vehicle."""
+    """Whether a driver that perceives from a frame on avoids a vehicle."""
     e, size = evidence, recorded_size(evidence, 0)
     if first >= len(e.time_s) - 1:
         return False
@@ -168,7 +168,7 @@ def _with_ego(values: Floats, own: Floats, first: int) -> Floats:
 
 
 def _prolonged(evidence: Evidence, steps: int) -> Evidence:
-    """The evidence and some more frames, in which all go on with their last velocity.
+    """Prolongs the evidence by `steps` frames at the last velocities.
 
     Choice: a vehicle that comes over to the ego's line stays on it, as one does that changes lanes.
     """

@@ -72,12 +72,12 @@ class Conflict:
 
     @property
     def came_over(self) -> bool:
-        """Whether the ego left its lane and so came over to the striker."""
+        """Whether the ego came over to the striker from its lane."""
         return self.in_lane < self.frame
 
 
 def find_conflict(evidence: Evidence, striker: int) -> Conflict:
-    """The conflict with the actor in column `striker`, which lasted until the contact in the last frame.
+    """Returns the conflict with the striker up to the last frame's contact.
 
     A conflict begins no earlier than the ego knows of the striker; with a pedestrian that steps out from behind a
     truck, when it comes into sight. With a striker that was never in sight it begins with the contact. Where the ego
@@ -130,7 +130,7 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], 
 
 
 def left_its_place(evidence: Evidence) -> int | None:
-    """Finds when the ego's front left its place by more than 0.375 m.
+    """Finds when the ego's front left its place by over 0.375 m.
 
     Returns None if it is back in its place in the last frame.
 
@@ -142,7 +142,7 @@ def left_its_place(evidence: Evidence) -> int | None:
 
 
 def left_its_lane(evidence: Evidence, striker: int) -> int | None:
-    """Finds the frame in which the ego left its lane towards the striker.
+    """Finds when the ego left its lane towards the striker.
 
     Returns None if it did not.
 
@@ -162,7 +162,7 @@ def left_its_lane(evidence: Evidence, striker: int) -> int | None:
 
 
 def came_further(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> bool:
-    """Tells whether the striker moved further across than the ego in 3 s.
+    """Whether the striker moved further across than the ego in 3 s.
 
     Each one's movement counts towards the other.
     """
@@ -185,7 +185,7 @@ def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
 
 @compiled
 def lasting_since(begins: Bools, lasts: Bools) -> int:
-    """Finds the first frame of a condition that lasts until the last frame, in which it holds anyway."""
+    """Finds the first frame from which a condition lasts to the end."""
     first, missing = len(begins) - 1, 0
     for t in range(len(begins) - 2, -1, -1):
         if begins[t]:
@@ -220,7 +220,7 @@ def collision_courses(path: Path, speed: Floats, size: Size, motion: MovingBox[F
 
 
 def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
-    """Tells whether the pedestrian is on the carriageway or within 1 s of it.
+    """Tells whether the pedestrian is on the carriageway or 1 s away.
 
     It holds in all frames for a pedestrian that was struck beside the carriageway: there the ego left the carriageway.
     """
@@ -260,7 +260,7 @@ def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
 
 
 def _cannot_stop(to_go_m: Floats, evidence: Evidence, striker: int, *, wary: bool) -> Bools:
-    """Frames in which the striker could no longer stop before the ego's corridor, `T`.
+    """Tells when the striker cannot stop before the ego's corridor, `T`.
 
     Choice: a striker that brakes already is taken to yield as long as firm braking suffices, but by a wary driver.
     """

@@ -28,7 +28,7 @@ def sides_of(areas: Sequence[Area]) -> Sides:
 
 @compiled
 def within(areas: Sides, x_m: float, y_m: float, margin_m: float = 0.0) -> bool:
-    """Whether a point lies in any of the areas, or no further than `margin_m` outside one."""
+    """Whether a point lies in an area or within `margin_m` of it."""
     for area in range(len(areas.first) - 1):
         here = True
         for k in range(areas.first[area], areas.first[area + 1]):
@@ -142,7 +142,7 @@ F = TypeVar("F", float, Floats)  # one number, or one for each frame
 
 
 class MovingBox(NamedTuple, Generic[F]):
-    """An oriented box on the move: now, or in each of `T` frames."""
+    """Oriented box with a velocity: now, or in each of `T` frames."""
 
     x: F
     y: F
@@ -154,7 +154,7 @@ class MovingBox(NamedTuple, Generic[F]):
 
 @compiled
 def with_margin(size: Size) -> Size:
-    """Adds the corridor's margin to either side of an ego of this size."""
+    """Adds the corridor's margin to either side of an ego's size."""
     return Size(size.half_length, size.half_width + CORRIDOR_M)
 
 
@@ -166,7 +166,7 @@ def at(motion: MovingBox[Floats], t: int) -> MovingBox[float]:
 
 @compiled
 def time_to_touch(path: Path, s: float, speed: float, size: Size, other: MovingBox[float], horizon: float) -> float:
-    """Computes the time until the ego touches another body, s; inf if never.
+    """Computes the time until the ego touches a body, s; else inf.
 
     The ego keeps its speed along its path, the body its velocity.
 
@@ -193,8 +193,9 @@ def time_to_touch(path: Path, s: float, speed: float, size: Size, other: MovingB
 
 @compiled
 def time_to_meet(path: Path, s: float, speed: float, size: Size, walker: MovingBox[float]) -> float:
-    """Computes the time until the ego reaches a pedestrian's way, s; inf if it could stop later.
+    """Computes the time until the ego reaches a pedestrian's way, s.
 
+    It is inf if the ego could stop later.
     The pedestrian keeps its velocity, and is at the place no more than 1 s before or after the ego: it may stop, turn
     back or run. A driver need not act earlier than its time to stop at leisure, 1.15 s + v / 3.4 m/s² and 4 s at most.
 
@@ -249,7 +250,7 @@ LEADER_BRAKES_MPS2 = 5.0
 
 
 class BodyOnPath(NamedTuple, Generic[F]):
-    """Another body as seen along the ego's path: now, or in each of `T` frames."""
+    """Another body along the ego's path: now, or in `T` frames."""
 
     gap_m: F  # from the ego's front to the other's rear, below 0 alongside and behind
     behind_m: F  # from the other's front to the ego's rear
@@ -280,7 +281,7 @@ def along(path: Path, first: int, s: float, speed: float, size: Size, other: Mov
 
 
 def along_series(path: Path, speed: Floats, size: Size, other: MovingBox[Floats]) -> BodyOnPath[Floats]:
-    """Places a body along the ego's path frame by frame; the path has a point per frame."""
+    """Places a body along the ego's path; the path has `T` points."""
     return BodyOnPath(*_along_rows(path, speed, size, other))
 
 
@@ -312,7 +313,7 @@ def towards(across_m: float, offset_m: float, lane_width_m: float) -> float:
 def lane_conflict(
     other: BodyOnPath[float], speed_mps: float, offset_m: float, accel_mps2: float, lane_width_m: float, wary: bool
 ) -> tuple[bool, bool]:
-    """Detects the beginning and the continuation of a conflict with a same-direction vehicle.
+    """Detects beginning and continuation of a conflict with a same-direction vehicle.
 
     A vehicle comes over if its body is beyond the marking of the ego's lane. It also does if it is more than 0.375 m
     off its own lane's centre towards the ego and reaches that marking within 1 s. The conflict begins when it does so

@@ -84,7 +84,7 @@ class View(NamedTuple):
 
 @compiled
 def view_of(ego: OnPath, scene: SceneAhead, street: Street, crossings: Crossings, step_s: float) -> View:
-    """Places the actors along the path; bodies that conceal do so, but those that lead the ego."""
+    """Places actors along the path; bodies conceal unless they lead the ego."""
     n, state = len(scene.vehicle), scene.state
     placed, hides = np.empty((3, n)), np.zeros(n, dtype=np.bool_)
     for i in range(1, n):
@@ -107,14 +107,14 @@ def stopping_m(speed_mps: float) -> float:
 
 @compiled
 def fitting_mps(ahead_m: float) -> float:
-    """The speed from which it stops `BEFORE_M` before a place; `stopping_m` the other way round."""
+    """Returns the speed that stops `BEFORE_M` before a place; inverts `stopping_m`."""
     reaction = COMFORT_MPS2 * DELAY_S
     return math.sqrt(reaction**2 + 2.0 * COMFORT_MPS2 * max(ahead_m - BEFORE_M, 0.0)) - reaction
 
 
 @compiled
 def held_to(view: View, ahead_m: float, passes_m: float, aside_m: float, walks_mps: float, least_mps: float) -> float:
-    """The acceleration that keeps a fitting speed before a place from which a pedestrian may come.
+    """Returns the acceleration towards `fitting_mps` before a place where pedestrians may enter.
 
     Args:
       view: of the moment.
@@ -165,7 +165,7 @@ def nothing_remembered(n: int) -> Floats:
 def allowed_accel(
     ego: OnPath, scene: SceneAhead, street: Street, crossings: Crossings, memory: Floats, step_s: float
 ) -> float:
-    """The most acceleration that the driver allows itself for the next step, m/s²; inf if nothing restrains it.
+    """Returns the driver's largest acceleration for a step, m/s²; inf if unrestrained.
 
     Args:
       ego: on its path.
@@ -209,7 +209,7 @@ def allowed_accel(
 
 @compiled
 def _at_crossings(view: View) -> float:
-    """Rules 1 and 2: what the driver cannot see of a crossing ahead."""
+    """Applies rules 1 and 2: crossings ahead with places out of sight."""
     ego, crossings = view.ego, view.crossings
     accel, looks_m, asked, stopped_for = math.inf, stopping_m(ego.speed_mps) + AHEAD_M, -1.0, False
     for k in range(len(crossings.spots)):
@@ -228,7 +228,7 @@ def _at_crossings(view: View) -> float:
 
 @compiled
 def _is_stopped_for(scene: SceneAhead, placed: Floats, enters_m: float) -> bool:
-    """Whether a vehicle of the ego's direction stops for a crossing in another lane."""
+    """Whether a same-direction vehicle in another lane stops for a crossing."""
     state = scene.state
     for i in range(1, len(scene.vehicle)):
         if not scene.vehicle[i] or not scene.seen[i] or math.isnan(state[X, i]):
@@ -302,7 +302,7 @@ def _nearing_mps(state: Floats, i: int, across: float, heading: float) -> float:
 
 @compiled
 def _is_at(crossings: Crossings, x: float, y: float) -> bool:
-    """Whether a place is on one of the crossings, or where pedestrians wait for it."""
+    """Whether a place is on a crossing or its waiting area."""
     for k in range(len(crossings.spots)):
         if math.hypot(crossings.spots[k, 0] - x, crossings.spots[k, 1] - y) < AT_CROSSING_M:
             return True
@@ -311,7 +311,7 @@ def _is_at(crossings: Crossings, x: float, y: float) -> bool:
 
 @compiled
 def _comes_across(view: View, i: int, link: int) -> bool:
-    """Rule 3 for a vehicle from across: whether it would be in the corridor within 3 s.
+    """Checks rule 3: a crossing vehicle reaches the corridor within 3 s.
 
     One that has to yield and still can is expected to, and so is one that brakes already.
     """
@@ -339,7 +339,7 @@ def _comes_across(view: View, i: int, link: int) -> bool:
 
 @compiled
 def _in_conflict(speed_mps: float, touch_s: float, grip_mps2: float, remembered: Floats, step_s: float) -> float:
-    """Applies rule 4, given the time to the actor; updates the memory of it."""
+    """Applies rule 4 for the time to an actor; updates its memory."""
     if touch_s < math.inf:
         remembered[SINCE_S] = 0.0 if remembered[SINCE_S] < 0.0 else remembered[SINCE_S] + step_s
         remembered[GONE_S] = 0.0

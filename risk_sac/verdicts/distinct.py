@@ -1,4 +1,4 @@
-"""Tells distinct failures apart by kind, and what a search finds by kind and variant.
+"""Distinct failures by kind, and a search's finds by kind and variant.
 
 `risk_sac.verdicts.labels` names both. Headline, comparisons and distinct failures count kinds; what a search keeps and
 replays goes by variants, because two to four kinds would starve it.
@@ -53,7 +53,7 @@ class DistinctFailures:
 
 
 class Finds:
-    """Counts the failures that a search has found by variant, and what each find is worth.
+    """Counts of a search's failures by variant, and the worth of finds.
 
     Choice: the first of a variant is worth 1, the first of a kind 4. The first candidate for the headline of either is
     worth four times as much again.
@@ -68,7 +68,7 @@ class Finds:
         self._candidates: set[str] = set()  # kinds and variants with a candidate for the headline
 
     def add(self, violations: Sequence[Collision | Violation]) -> float:
-        """Counts the valid violations of an episode; returns the worth of what is new among them."""
+        """Counts an episode's valid violations; returns the worth of the new."""
         worth = 0.0
         for violation in violations:
             kind, variant = violation.kind, variant_name(violation)
@@ -95,7 +95,7 @@ def _newness(kind_known: bool, variant_known: bool) -> float:
 
 
 def distinct_failures(violations: Sequence[Collision | Violation]) -> tuple[int, ...]:
-    """Positions of the first of each kind among violations in order of occurrence."""
+    """Returns the position of each kind's first violation, in order of occurrence."""
     found = DistinctFailures()
     return tuple(position for position, violation in enumerate(violations) if found.add(violation))
 

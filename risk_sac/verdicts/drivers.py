@@ -1,4 +1,4 @@
-"""The two fuzzy surfaces of the JRC's fuzzy safety model: how uncomfortable, and how critical, a gap is.
+"""The JRC's fuzzy surfaces: how uncomfortable and how critical a gap is.
 
 Sources: Mattas, Makridis, Botzoris, Kriston, Minarini, Papadopoulos, Re, Rognelund, Ciuffo 2020, "Fuzzy surrogate
 safety metrics for real-time assessment of rear-end collision risk. A study based on empirical observations", Accident
@@ -148,7 +148,7 @@ def fuzzy(situation: Situation) -> float:
 
 @compiled
 def rss(situation: Situation) -> float:
-    """Braking of RSS's proper response, m/s²: 6 while both distances are too small, else none."""
+    """Returns RSS's braking, m/s²: 6 while both distances are short, else none."""
     ahead, speed = situation.along, situation.speed_mps
     if ahead.behind_m > 0.0:
         return 0.0

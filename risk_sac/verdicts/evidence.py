@@ -1,4 +1,4 @@
-"""Record of an episode up to its contact, as arrays; the judge's only input."""
+"""Record of an episode up to contact as arrays: the judge's input."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -73,7 +73,7 @@ class Evidence:
 
     @classmethod
     def from_series(cls, series: Mapping[str, NDArray[Any]], ground: Ground, released_s: float) -> "Evidence":
-        """From the time series of an episode, see `Trace.series`; the adversaries were released at `released_s`."""
+        """Reads an episode's time series (`Trace.series`); `released_s` is the adversaries' release."""
         known = np.asarray(series["visible"] == 1.0)
         known[:, 0] = True
         names = (*PER_ACTOR, "link", "kind", "body", "role", "length_m", "width_m")
@@ -111,7 +111,7 @@ class Evidence:
 
     @property
     def released(self) -> int:
-        """The frame of the adversaries' release; the last one if that comes later."""
+        """Returns the frame of the adversaries' release, at most the last."""
         return min(int(np.searchsorted(self.time_s, -self.step_s / 2)), len(self.time_s) - 1)
 
     @property
@@ -125,7 +125,7 @@ class Evidence:
 
 
 def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.0) -> Bools:
-    """Tells which points lie in any of the areas, or up to `margin_m` outside."""
+    """Tells which points lie in an area or within `margin_m` of one."""
     found = np.zeros(np.shape(x_m), dtype=np.bool_)
     for area in areas:
         here = np.ones(np.shape(x_m), dtype=np.bool_)
@@ -138,7 +138,7 @@ def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.
 def soon_inside(
     areas: Sequence[Area], x_m: Floats, y_m: Floats, vx_mps: Floats, vy_mps: Floats, ahead_s: float
 ) -> Bools:
-    """Tells which points are in an area within `ahead_s` if they keep their velocity."""
+    """Tells which points reach an area in `ahead_s` at constant velocity."""
     t = np.linspace(0.0, ahead_s, KERB_STEPS + 1)[:, None]
     soon: Bools = np.any(inside(areas, x_m + t * vx_mps, y_m + t * vy_mps), axis=0)
     return soon
@@ -152,7 +152,7 @@ class LaneSeries(NamedTuple):
 
 
 def lanes_of(evidence: Evidence, actor: int, first: int = 0) -> LaneSeries:
-    """Reads the lane that an actor is nearest to, in its direction, from frame `first` on.
+    """Reads the nearest lane in an actor's direction from frame `first` on.
 
     Without a net, without a lane nearby and where the actor has left, it is the ground's limit and width.
     """
@@ -194,7 +194,7 @@ def recorded_motion(evidence: Evidence, actor: int) -> MovingBox[Floats]:
 
 
 def recorded_contact(evidence: Evidence, striker: int) -> Contact:
-    """Returns how the striker touches the ego in the last step; its `other` is 1."""
+    """Returns the striker's contact in the last step; its `other` is 1."""
     e, both, steps = evidence, [0, striker], np.zeros((2, WIDTH + 1, 2))
     for state, t in zip(steps, (-2 if len(e.time_s) > 1 else -1, -1), strict=True):
         state[[X, Y, HEADING]] = e.x_m[t, both], e.y_m[t, both], e.heading_rad[t, both]
@@ -208,7 +208,7 @@ def ego_path(evidence: Evidence) -> Path:
 
 
 def front_moved_across(evidence: Evidence) -> Floats:
-    """Sums the lateral motion of the ego's front bumper, `T`, m, positive to the left.
+    """Sums the front bumper's lateral motion, `T`, m, positive to the left.
 
     The sum starts in the first frame and goes on across lanes.
 
@@ -236,7 +236,7 @@ def keeps_lane(evidence: Evidence, first: int) -> bool:
 
 
 def lane_path(evidence: Evidence, first: int) -> Path:
-    """Returns the path of the lane that the ego was in at frame `first`.
+    """Returns the path of the ego's lane at frame `first`.
 
     It is the recorded path without what the ego moved across since; its place across the lane stays the same.
     """
@@ -250,7 +250,7 @@ def lane_path(evidence: Evidence, first: int) -> Path:
 
 
 def lane_heading(evidence: Evidence) -> Floats:
-    """Heading of the ego's lane, `T`: from where it drove and how much of that was across.
+    """Computes the heading of the ego's lane from its motion, `T`.
 
     While the ego stands it is the heading before, in the first frame the ego's own.
     """

@@ -57,7 +57,7 @@ def left_first(
 
 
 def _danger(evidence: Evidence, striker: int) -> tuple[int, bool]:
-    """Finds since which frame it was dangerous, and whether the lateral distance became too short last."""
+    """Finds when danger began, and whether lateral distance became short last."""
     walks = np.array([evidence.kind[striker] == Kind.PEDESTRIAN])
     along, across = _margins(recorded_motion(evidence, 0), recorded_motion(evidence, striker), walks, RSS)
     dangerous = (along < 0.0) & (across < 0.0)
@@ -66,7 +66,7 @@ def _danger(evidence: Evidence, striker: int) -> tuple[int, bool]:
 
 
 def _on_crossing_ways(evidence: Evidence, striker: int, began: int, yields: str | None) -> tuple[float, float]:
-    """Finds the frames in which ego and striker leave the response; inf if they do not."""
+    """Finds frames in which ego and striker leave the response, or inf."""
     walks = evidence.kind[striker] == Kind.PEDESTRIAN
     speed = column(evidence.speed_mps, striker)
     ego = _leaves(evidence, column(evidence.speed_mps, 0), began, RSS.brake_min_mps2, BUILD_UP_MPS, yields == "ego")
@@ -100,7 +100,7 @@ def _on_one_lane(evidence: Evidence, striker: int, began: int, seen: BodyOnPath[
 def _leaves(
     evidence: Evidence, speed: Floats, began: int, brake_mps2: float, tolerance_mps: float, yields: bool = False
 ) -> float:
-    """Finds the first frame with a speed above the proper response's; inf if none.
+    """Finds the first frame faster than the proper response; inf if none.
 
     The speed is the one towards the other.
 
@@ -138,7 +138,7 @@ SLOW_MPS = 3.0  # an ego that stands looks as far ahead as at this speed
 
 
 def ego_part(evidence: Evidence, striker: int, conflict: Conflict, yields: str | None) -> EgoPart:
-    """Computes the ego's reaction to the actor in column `striker` until the contact.
+    """Computes the ego's reaction to the striker up to the contact.
 
     The contact is in the last frame.
 
@@ -177,7 +177,7 @@ def in_view_from(evidence: Evidence, striker: int) -> int | None:
 
 
 def _near(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> Bools:
-    """Whether the ego sees a pedestrian on the carriageway ahead, within 1.5 m of its corridor, `T`."""
+    """Whether the ego sees a carriageway pedestrian near its corridor, `T`."""
     e, ground = evidence, evidence.ground
     if e.kind[striker] != Kind.PEDESTRIAN:
         return np.zeros(len(e.time_s), dtype=np.bool_)
@@ -192,7 +192,7 @@ def _near(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> Bools:
 
 
 def _aware_from(near: Bools, conflict: int) -> int:
-    """Finds since when the ego saw the striker in its way, or near it."""
+    """Finds since when the ego saw the striker near its way."""
     elsewhere = np.flatnonzero(~near[:conflict])
     return int(elsewhere[-1]) + 1 if len(elsewhere) else 0
 
@@ -204,7 +204,7 @@ def _gained(speed: Floats, responds: int) -> float:
 
 
 def _started(evidence: Evidence, striker: int, conflict: Conflict, near: Bools) -> bool:
-    """Tells whether the ego drove on although it saw the striker in its way.
+    """Tells whether the ego drove on despite the striker in its way.
 
     It did so if it stood or braked within the last 4 s and then sped up.
 
@@ -266,7 +266,7 @@ def fault(parts: Parts) -> Fault:
 
 
 def came_first(evidence: Evidence, striker: int) -> bool:
-    """Tells whether a vehicle was in the junction before the ego's signal turned green.
+    """Tells whether a vehicle was in the junction before the ego's green.
 
     The ego, which enters on that green, has to yield to one that entered lawfully.
 
@@ -285,7 +285,7 @@ def came_first(evidence: Evidence, striker: int) -> bool:
 def has_to_yield(
     conflict_type: ConflictType, ground: str, broke: Collection[str], ego_broke: Collection[str], *, first: bool = False
 ) -> str | None:
-    """Names which had to yield to the other: ego or striker; None where the record does not tell.
+    """Names which had to yield: ego, striker, or None if unclear.
 
     A follower has to, and one that comes over; at a crossing the ego, unless the pedestrian came on red, and beside it
     the pedestrian. Between vehicles whose ways cross their offences tell, and `first`: whether the striker was in the

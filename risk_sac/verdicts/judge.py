@@ -53,8 +53,9 @@ def collision_of(
     *,
     drivers: Collection[str] = PREVENTING,
 ) -> Collision:
-    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`.
+    """Returns the record of a contact in `frame`, the last one.
 
+    `measures` begin with the release at `released_s`.
     `drivers` are the reference drivers whose word makes it preventable.
     """
     other, warning = frame.ids[contact.other], measures[:-WARNING_STEPS]
@@ -227,7 +228,7 @@ def violations_of(
     *,
     drivers: Collection[str] = PREVENTING,
 ) -> tuple[Violation, ...]:
-    """The violations without contact of the requirements that count, in the order of time.
+    """Returns violations without contact of the requirements that count, ordered by time.
 
     Args:
       requirements: of the episode.
@@ -257,7 +258,7 @@ def violations_of(
 
 
 def _onsets(history: History, column: int) -> list[int]:
-    """Lists the frames in which a requirement begins to be violated, at most four.
+    """Lists up to four frames in which a requirement becomes violated.
 
     One that has lasted since the first second begins once more after 5 s.
     """
@@ -342,7 +343,7 @@ def _inherited(requirement: Requirement, history: History, time_s: float, met: M
 
 
 def _fault(evidence: Evidence, met: MetActor | None, broke: Sequence[str], graded: Grade) -> Fault:
-    """Judges a violation that `met` brought about; None: one of the ego's own driving, which is the ego's."""
+    """Judges a violation caused by `met`; None means the ego's own driving."""
     if met is None:
         return fault(parts_of_violation(own=True, yields=None, other_broke=(), broke=broke, grade=graded))
     conflict, other = met.conflict, met.column
@@ -354,7 +355,7 @@ def _fault(evidence: Evidence, met: MetActor | None, broke: Sequence[str], grade
 
 
 def _soonest_met(measures: Measures) -> int | None:
-    """Finds the column of the actor that the ego would meet soonest; None if it would meet none."""
+    """Finds the column of the actor with the earliest encounter, or None."""
     encounter_s = measures.assessment.others[ENCOUNTER]
     nearest = int(encounter_s.argmin())
     return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None

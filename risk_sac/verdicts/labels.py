@@ -1,4 +1,4 @@
-"""Severity of a contact: the risk of injury at its impact speed, and the class that follows.
+"""Severity of a contact: injury risk at its impact speed, and class.
 
 The impact speed is taken along the normal of the contact, so that bodies that slide along each other hardly collide.
 Between vehicles, and with riders, it is the speed at which they close; a pedestrian is struck with the vehicle's own
@@ -51,17 +51,17 @@ SEVERE_RISK = 0.01
 
 
 def fatality_risk(impact_mps: float) -> float:
-    """Returns the risk that a pedestrian dies of being struck at this speed."""
+    """Returns a pedestrian's risk of death for an impact speed."""
     return _logistic(FATALITY, impact_mps * KMH)
 
 
 def serious_injury_risk(delta_v_mps: float) -> float:
-    """Computes an occupant's risk of an injury of MAIS 3 or more for a change of velocity."""
+    """Computes an occupant's risk of MAIS 3 or more for a delta-v."""
     return _logistic(MAIS3, delta_v_mps * MILES_PER_H)
 
 
 class Impact(NamedTuple):
-    """Impact of a contact: its speed, the risk of injury and the harm that the risk is of."""
+    """Impact speed of a contact, risk of injury and kind of harm."""
 
     speed_mps: float
     risk: float
@@ -69,7 +69,7 @@ class Impact(NamedTuple):
 
 
 def delta_v_mps(closing_mps: float, own_kg: float, other_kg: float) -> float:
-    """Returns by how much a body's velocity changes if both move on as one (conservation of momentum)."""
+    """Returns a body's change of velocity if both move on together."""
     return closing_mps * other_kg / (own_kg + other_kg)
 
 
@@ -81,7 +81,7 @@ def severity(impact_mps: float, risk: float) -> Severity:
 
 
 def impact(evidence: Evidence, striker: int, contact: Contact) -> Impact:
-    """Computes the impact of a contact; between vehicles, the risk of the occupants who are worse off."""
+    """Computes a contact's impact; between vehicles for the worse-off occupants."""
     ego, other = (body_of(int(evidence.body[actor])) for actor in (0, striker))
     closing_mps = max(0.0, contact.closing_normal_mps)
     match other.injury:
@@ -112,7 +112,7 @@ LANE_CHANGE_M = 1.0
 
 
 def ground(evidence: Evidence, striker: int) -> str:
-    """Names the ground: lane, junction, crossing or beside_crossing, which matter to pedestrians only."""
+    """Names the ground: lane or junction; for pedestrians also crossing or beside_crossing."""
     where, here = evidence.ground, (evidence.x_m[-1:, striker], evidence.y_m[-1:, striker])
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         if inside(where.crossings, *here)[0]:
@@ -138,8 +138,9 @@ def manoeuvre(evidence: Evidence) -> str:
 
 
 def response(evidence: Evidence, conflict: Conflict) -> str:
-    """none, late_braking, braking, standing, starting or accelerating: what the ego did in the last second.
+    """Names what the ego did in the last second before contact.
 
+    One of none, late_braking, braking, standing, starting and accelerating.
     Of what came before the conflict nothing counts. Of braking and speeding up, the longer counts. Late is an ego that
     first braked in the conflict later than R157's driver. One that stood within the last 3 s and gains speed at
     the contact is starting.
@@ -241,7 +242,7 @@ def name_violation(requirement: str, *, manoeuvre: str, broke: tuple[str, ...], 
 
 
 def _striker(evidence: Evidence, striker: int, conflict: Conflict) -> str:
-    """Names the striker; a body that the conflict's type does not say is named by its row."""
+    """Names the striker; its body too where the conflict type lacks it."""
     body = body_of(int(evidence.body[striker]))
     vehicle = "vehicle" if body.shape == "vehicle" else body.name
     if evidence.role[striker] == Role.STATIC:

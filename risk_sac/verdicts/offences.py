@@ -1,4 +1,4 @@
-"""Offences of a striker that endangered the ego: unsafe lane change, brake check, turn into the ego's way.
+"""Offences of a striker that endangered the ego, and the ego's own.
 
 Background traffic is not asked for brake checks: SUMO's drivers brake for a reason, which is not always on record.
 """
@@ -99,7 +99,7 @@ def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bo
 
 
 def left_carriageway(evidence: Evidence, actor: int = EGO) -> frozenset[str]:
-    """Names how a vehicle's whole body left its carriageway in the last 3 s.
+    """Names how a vehicle's whole body left its carriageway within 3 s.
 
     `wrong_direction`: on an oncoming lane, without overtaking; `off_road`: beside any lane.
     """
@@ -125,7 +125,7 @@ def left_carriageway(evidence: Evidence, actor: int = EGO) -> frozenset[str]:
 
 
 def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
-    """Whether a vehicle entered although it had to yield and the other did not.
+    """Whether a vehicle that had to yield entered before one with priority.
 
     Their signals at its entry decide: one that turns green later gives no priority over what is in the junction. None
     is recorded for background traffic, whose drivers enter on green.
@@ -141,7 +141,7 @@ def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
 
 
 def reverses(evidence: Evidence, striker: int) -> bool:
-    """Whether the vehicle goes backwards when it strikes; SUMO takes its heading from the lane."""
+    """Whether the vehicle drives against its heading, the lane's, at the contact."""
     e = evidence
     heading = e.heading_rad[-1, striker]
     speed = e.vx_mps[-1, striker] * math.cos(heading) + e.vy_mps[-1, striker] * math.sin(heading)
@@ -149,7 +149,7 @@ def reverses(evidence: Evidence, striker: int) -> bool:
 
 
 def speeds(evidence: Evidence, actor: int) -> bool:
-    """Whether the vehicle was more than 10 % over the limit in the last 3 s.
+    """Whether a vehicle exceeded 110 % of the limit within 3 s.
 
     The ego may be as fast as at the release, less 2 m/s² from 1.15 s after it on.
     """
@@ -162,16 +162,16 @@ def speeds(evidence: Evidence, actor: int) -> bool:
 
 
 def pedestrian_on_red(evidence: Evidence, striker: int) -> bool:
-    """Whether the pedestrian stepped on red onto the crossing where it was struck; `KERB_M` beside it counts.
+    """Whether the pedestrian stepped on red onto the crossing of the contact.
 
-    A pedestrian that steps onto it on green and meets red half way has broken no rule.
+    `KERB_M` beside it counts. A pedestrian that steps onto it on green and meets red half way has broken no rule.
     """
     stepped = _stepped_onto_crossing(evidence, striker)
     return stepped is not None and int(evidence.link[stepped, striker]) in RED
 
 
 def took_crossing(evidence: Evidence, striker: int) -> bool:
-    """Whether the ego came onto a crossing after the pedestrian had stepped onto it, and not on red."""
+    """Whether the ego entered a crossing after a pedestrian without red."""
     stepped = _stepped_onto_crossing(evidence, striker)
     if stepped is None or int(evidence.link[stepped, striker]) in RED:
         return False
@@ -181,7 +181,7 @@ def took_crossing(evidence: Evidence, striker: int) -> bool:
 
 
 def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
-    """Whether a vehicle is in a junction that it entered on one of these letters.
+    """Whether a vehicle is in a junction that it entered on `letters`.
 
     It is until its whole body has left the junction, however long that takes; where the record does not say where the
     junction ends, for 6 s.
@@ -201,7 +201,7 @@ def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
 
 
 def on_inherited_red(evidence: Evidence) -> bool:
-    """Whether the ego entered on a red that it inherited at the release.
+    """Whether the ego entered on a red inherited at the release.
 
     It could not stop at leisure any more: with 3.4 m/s² after 0.75 s, from where it was at the release.
     """
@@ -232,7 +232,7 @@ def inherits_stop(speed_mps: float, to_line_m: float, after_s: float) -> bool:
 
 
 def entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
-    """Finds the frame of a vehicle's last entry on these letters, or None.
+    """Finds the frame of a vehicle's last entry on `letters`, or None.
 
     On entry the signal goes from one of these letters to none. A change to another letter is a change of the signal,
     unless the vehicle came into a junction in that step: the letter is then the next junction's.
@@ -250,7 +250,7 @@ def entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
 
 
 def _stepped_onto_crossing(evidence: Evidence, striker: int) -> int | None:
-    """The frame in which the pedestrian stepped onto the crossing that it was struck on; None without one."""
+    """Finds when the pedestrian stepped onto the contact's crossing; None without one."""
     e = evidence
     on = inside(e.ground.crossings, e.x_m[:, striker], e.y_m[:, striker], KERB_M)
     if not on[-1]:
@@ -313,7 +313,7 @@ def changes_lane_unsafely(evidence: Evidence, striker: int, seen: BodyOnPath[Flo
 
 
 def enters_safely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], least_gap_m: float = 0.0) -> bool:
-    """Whether a cut-in leaves the ego room to brake, by UN R157, 5.2.5.2.
+    """Whether a cut-in leaves the ego room to brake (UN R157, 5.2.5.2).
 
     When it intrudes by 0.3 m into the ego's lane, it is that far ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
     """
@@ -322,7 +322,7 @@ def enters_safely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], le
 
 
 def leaves_room(follower_mps: float, seen: BodyOnPath[Floats], t: int, least_gap_m: float) -> bool:
-    """Whether a body ahead leaves the follower the room of UN R157, 5.2.5.2."""
+    """Whether a body leaves its follower the room of UN R157, 5.2.5.2."""
     closing = follower_mps - seen.speed_mps[t]
     needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_CUT_IN_S
     return bool(seen.gap_m[t] > least_gap_m and seen.ttc_s[t] > needed_s)
@@ -345,7 +345,7 @@ def checks_brakes(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], be
 
 
 def turns_into_path(evidence: Evidence, striker: int) -> bool:
-    """Tells whether a pedestrian turned into the way of an ego in sight.
+    """Tells whether a pedestrian turned into a visible ego's way.
 
     It turned by 30° or more within the last 4 s. What the ego sees can see the ego.
     """
@@ -376,7 +376,7 @@ def intrusion(evidence: Evidence, actor: int, owner: int, seen: BodyOnPath[Float
 
 
 def _any_ahead(evidence: Evidence, vehicle: int, frames: NDArray[np.int64]) -> Bools:
-    """Tells whether a road user is, or soon will be, in the way.
+    """Tells whether a road user is in the way, or soon is.
 
     That is within 30 m ahead of the vehicle.
     """

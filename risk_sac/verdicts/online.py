@@ -1,4 +1,4 @@
-"""Finds conflicts of the present frame, for egos that drive and for scenes that begin.
+"""Finds conflicts of the present frame, for driving egos and starting scenes.
 
 The measures are those of `risk_sac.verdicts.present`.
 """
@@ -23,7 +23,7 @@ OVER_S = 1.0  # a conflict that has been gone for so long is over
 
 
 def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, wary: bool = False) -> Bools:
-    """Tells with which of `frame.ids` a driver in the ego's place is in conflict.
+    """Tells with which of `frame.ids` a driver in the ego's place conflicts.
 
     A crossing vehicle that has to stop or to yield, and still can at 3.4 m/s², is expected to: in a record the contact
     shows that it did not.
@@ -48,7 +48,7 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
 
 
 class Reflex(Protocol):
-    """Braking of an ego that SUMO drives, beside that of SUMO's models; one for each episode."""
+    """Braking beside SUMO's models, for one episode of a SUMO-driven ego."""
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
         """Computes its braking now, m/s²; 0 leaves driving to SUMO's models."""
@@ -71,7 +71,7 @@ class R157Reflex:
         self._last_s = 0.0
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """Computes its braking now, m/s²; 0 while it perceives no conflict. Arguments as of `conflicts_now`."""
+        """Computes the braking, m/s²; 0 without perceived conflict. Arguments: see `conflicts_now`."""
         now = frame.time_s
         if conflicts_now(frame, path, seen, self._ground).any():
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
@@ -96,7 +96,7 @@ class DefensiveReflex:
         self._priority_s = -math.inf  # when its signal last gave it priority
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """Computes its braking now, m/s²; 0 where nothing restrains it. Arguments as of `conflicts_now`."""
+        """Computes the braking, m/s²; 0 if unrestrained. Arguments: see `conflicts_now`."""
         if frame.ids != self._ids:
             before, self._memory = self._memory, nothing_remembered(len(frame.ids))
             for column, id_ in enumerate(frame.ids):

@@ -1,4 +1,4 @@
-"""Judges how likely road users do what the adversaries of a recording did.
+"""Judges how likely road users behave as a recording's adversaries do.
 
 Two probabilities decide, and the less likely counts. The first is the least of all features', corrected for their
 number (Holm 1979): traffic of many honest actors stays ordinary. The second is of all of them together, by the
@@ -57,7 +57,7 @@ def plausibility_of(evidence: Evidence) -> Plausibility:
 
 
 def judge_observed(observed: Iterable[Observed], ids: Sequence[str], traffic: Undisturbed) -> Plausibility:
-    """Judges features of all adversaries that acted, by the traffic's distributions without a published one."""
+    """Judges adversaries' features by published distributions, else by the traffic's."""
     judged = [_probability(each, traffic) for each in observed]
     published = [each for each in judged if each.published]
     least, joint = _least(judged), _joint(judged, traffic.scale)
@@ -73,7 +73,7 @@ def judge_observed(observed: Iterable[Observed], ids: Sequence[str], traffic: Un
 
 
 def in_words(fact: BehaviourFact) -> str:
-    """Returns, e.g., "left changes lane 0.2 s before the next vehicle: 1 of 3,000 lane changes"."""
+    """Formats a fact with its share: "… 1 of 3,000 lane changes"."""
     feature = FEATURES[fact.feature]
     one_in = 1.0 / fact.probability
     digits = 1 - math.floor(math.log10(one_in)) if one_in > 10.0 else 0
@@ -102,21 +102,21 @@ def _probability(observed: Observed, traffic: Undisturbed) -> JudgedFeature:
 
 
 def _least(judged: Sequence[JudgedFeature]) -> float:
-    """Least probability, corrected for the number of features; the first step of Holm's procedure."""
+    """Returns the least probability, corrected for the number of features (Holm's procedure)."""
     if not judged:
         return 1.0
     return min(1.0, len(judged) * min(each.probability for each in judged))
 
 
 def _joint(judged: Sequence[JudgedFeature], scale: float) -> float:
-    """Probability that the features of independent events are together at least as unlikely."""
+    """Returns the probability of independent events at least as unlikely together."""
     events = by_event(judged)
     tests = [*(truncated_product(events, at, scale) for at in TRUNCATIONS), two_least(events, scale)]
     return min(1.0, len(tests) * min(tests))  # Bonferroni's correction for the number of tests
 
 
 def by_event(judged: Iterable[JudgedFeature]) -> list[float]:
-    """Lists the probabilities of events: of each the least of its features', corrected for their number."""
+    """Lists each event's probability: its features' least, corrected for their number."""
     grouped = groupby(judged, key=_event)
     features = [[each.probability for each in group] for _, group in grouped]
     return [min(1.0, len(probabilities) * min(probabilities)) for probabilities in features]
@@ -129,7 +129,7 @@ def _event(judged: JudgedFeature) -> tuple[int, str, float]:
 
 
 def truncated_product(probabilities: Sequence[float], at: float, scale: float = 1.0) -> float:
-    """Probability of a product of the probabilities up to `at` that is at most this one.
+    """Returns the probability of a truncated product at most this one.
 
     P = Σ_k C(n, k) (1 - τ)^(n - k) τ^k · P(Γ(k) ≥ s - k ln(1 / τ)), s = -Σ ln p over p ≤ τ
 
@@ -156,7 +156,7 @@ def truncated_product(probabilities: Sequence[float], at: float, scale: float = 
 
 
 def two_least(probabilities: Sequence[float], scale: float = 1.0) -> float:
-    """Bounds the probability that the two least probabilities have a product of at most this one.
+    """Bounds the probability that the two least have at most this product.
 
     P ≤ C(n, 2) · w (1 - ln w), w the product: each pair of events has it by itself.
 
@@ -176,7 +176,7 @@ def two_least(probabilities: Sequence[float], scale: float = 1.0) -> float:
 
 
 def _erlang_above(k: int, value: float) -> float:
-    """Probability that a sum of `k` exponential numbers of mean 1 is above a value."""
+    """Returns P(sum of `k` exponential numbers of mean 1 > `value`)."""
     if value <= 0.0:
         return 1.0
     term = total = math.exp(-value)
@@ -193,7 +193,7 @@ def _class(probability: float) -> PlausibilityClass:
 
 
 def _facts(judged: Sequence[JudgedFeature], ids: Sequence[str]) -> tuple[BehaviourFact, ...]:
-    """Lists the least likely value of each feature of each actor, the least likely first."""
+    """Lists the least likely value per actor and feature, least likely first."""
 
     def same(each: JudgedFeature) -> tuple[int, str]:
         return each.observed.actor, each.observed.feature

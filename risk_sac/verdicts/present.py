@@ -1,4 +1,4 @@
-"""Whether a driver is in a conflict with an actor right now, and which places hide pedestrians.
+"""Present conflicts with actors, and places that hide pedestrians.
 
 The measures are those of `risk_sac.verdicts.conflict`; only what a record knows of the future is foreseen here: the
 ego's path is given, and everything else goes on straight.
@@ -53,7 +53,7 @@ class Crossings(NamedTuple):
 
 
 def boxes_of(crossings: Sequence[Area]) -> Floats:
-    """Computes rectangles about crossings, `k x 6`: centre, direction of the longest side, half the sizes."""
+    """Computes crossings' boxes, `k x 6`: centre, longest side's direction, half sizes."""
     found = np.empty((len(crossings), 6))
     for row, area in zip(found, crossings, strict=True):
         corners = np.array(_corners(area))
@@ -78,7 +78,7 @@ def _corners(area: Area) -> list[tuple[float, float]]:
 
 @compiled
 def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_width_m: float) -> Crossings:
-    """Finds the crossings on a path between two stations, and spots along each with its waiting areas."""
+    """Finds crossings on part of a path, with spots including waiting areas."""
     entries, count = np.empty((len(boxes), 2)), 0
     spots, filled = np.empty((64 * len(boxes), 4)), 0
     for k in range(len(boxes)):
@@ -115,7 +115,7 @@ def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_wid
 
 
 def concealing(codes: Iterable[int]) -> Bools:
-    """Tells which bodies hide what is behind them, by their codes in frames and recordings."""
+    """Tells by body codes which bodies hide what is behind them."""
     return np.array([body_of(int(code)).conceals for code in codes], dtype=np.bool_)
 
 
@@ -138,7 +138,7 @@ def walls_of(state: Floats, hides: Bools) -> Floats:
 
 @compiled
 def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: MovingBox[float]) -> bool:
-    """Whether a corner or the centre of a body can be seen, as `risk_sac.world.geometry.line_of_sight` asks it."""
+    """Whether a corner or centre is visible, as in `risk_sac.world.geometry.line_of_sight`."""
     cos, sin = math.cos(body.heading), math.sin(body.heading)
     for ahead, left in ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
         a, b = ahead * CORNER * body.size.half_length, left * CORNER * body.size.half_width
@@ -223,7 +223,9 @@ def moving_box(state: Floats, i: int) -> MovingBox[float]:
 
 @compiled
 def conflict_in(ego: OnPath, state: Floats, i: int, vehicle: bool, link: int, street: Street, wary: bool) -> float:
-    """Computes the time until the ego reaches a conflicting actor, s; inf without a conflict, 0 alongside.
+    """Computes the time until the ego reaches a conflicting actor, s.
+
+    It is inf without a conflict, 0 alongside.
 
     Args:
       ego: on its path.
@@ -262,13 +264,13 @@ def conflict_in(ego: OnPath, state: Floats, i: int, vehicle: bool, link: int, st
 
 @compiled
 def must_yield(link: int) -> bool:
-    """Whether a vehicle before this signal is expected to stop or to yield."""
+    """Whether a vehicle at this signal is expected to stop or yield."""
     return link in (RED, UNCONTROLLED, YELLOW, GREEN_MINOR)
 
 
 @compiled
 def soon_walked(street: Street, other: MovingBox[float]) -> bool:
-    """Whether a pedestrian is on the carriageway or a crossing, or comes there within 1 s."""
+    """Whether a pedestrian is on carriageway or crossing, or within 1 s."""
     if len(street.roadway.sides) == 0:
         return True
     for k in range(KERB_STEPS + 1):
@@ -282,7 +284,7 @@ def soon_walked(street: Street, other: MovingBox[float]) -> bool:
 def _entry(
     ego: OnPath, corridor: Size, other: MovingBox[float], other_mps: float, braking_mps2: float
 ) -> tuple[float, float]:
-    """`entry_distance` of a straight course as long as stopping takes; inf if it can stop before."""
+    """Returns `entry_distance` along the straight stopping distance; inf if it stops before."""
     stopping_m = other_mps**2 / (2 * braking_mps2)
     ahead = np.linspace(0.0, stopping_m, math.ceil(stopping_m / AHEAD_M) + 1)
     cos, sin = (other.vx / other_mps, other.vy / other_mps) if other_mps > STANDING_MPS else (0.0, 0.0)
@@ -295,7 +297,7 @@ def _entry(
 def _both_come(
     entry_m: float, meets_m: float, speed: float, size: Size, other: MovingBox[float], other_speed: float
 ) -> bool:
-    """Whether both pass the place where their ways meet within the horizon, and less than 1 s apart."""
+    """Whether both meet within the horizon, passing less than 1 s apart."""
     if speed < STANDING_MPS or other_speed < STANDING_MPS:
         return False
     passing_m = 2 * (size.half_length + other.size.half_length)

@@ -120,7 +120,7 @@ def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
 
 
 def grade(keeps: Mapping[str, bool], drivers: Collection[str] = PREVENTING) -> Grade:
-    """Grades a violation by which reference drivers would keep the requirement; `drivers` are those that count."""
+    """Grades a violation by which of the reference `drivers` keep the requirement."""
     if any(keeps.get(name, False) for name in drivers):
         return Grade.PREVENTABLE
     return Grade.FULL_BRAKING if keeps["full_braking"] else Grade.UNAVOIDABLE
@@ -129,7 +129,7 @@ def grade(keeps: Mapping[str, bool], drivers: Collection[str] = PREVENTING) -> G
 def _braking(
     evidence: Evidence, path: Path, track: MovingBox[Floats], driver: int, began: int, perceives_s: float
 ) -> RolloutEnd | None:
-    """Drives against one actor with a driver that brakes; None if the ego is struck before it perceives."""
+    """Brakes against one actor; None if struck before the driver perceives."""
     e = evidence
     first = began + round(perceives_s / e.step_s)
     if first >= len(e.time_s) - 1:
@@ -174,7 +174,7 @@ def _outcome(evidence: Evidence, other: int, ending: RolloutEnd | None, *, kept:
 
 
 def from_behind(pose: Pose, other: Pose, size: Size, other_size: Size) -> bool:
-    """Whether the contact of the ego with another body lies on the ego's rear."""
+    """Whether the ego's contact with another body lies at its rear."""
     state = np.zeros((WIDTH + 1, 2))
     state[[X, Y, HEADING]] = np.transpose((pose, other))
     state[[LENGTH, WIDTH]] = 2 * np.transpose((size, other_size))
@@ -196,7 +196,7 @@ AFTER_CONTACT_STEPS = 40
 
 
 class History(NamedTuple):
-    """Frames and measures of an episode, `T`, and the evidence made of them."""
+    """Frames, measures and evidence of an episode; `T` frames."""
 
     frames: Sequence[Frame]
     measures: Sequence[Measures]
@@ -204,7 +204,7 @@ class History(NamedTuple):
 
 
 class MetActor(NamedTuple):
-    """The actor that mattered most at a violation, and the ego's conflict with it."""
+    """The actor that mattered most at a violation, and the ego's conflict."""
 
     column: int  # in the evidence
     conflict: Conflict
@@ -213,7 +213,7 @@ class MetActor(NamedTuple):
 def kept_by(
     requirement: Requirement, gauge: Gauge, history: History, index: int, met: MetActor | None
 ) -> Mapping[str, bool]:
-    """Reference driver → whether it keeps a requirement that the ego first violated in frame `index`.
+    """Reference driver → whether it keeps the requirement violated in frame `index`.
 
     `gauge` measures that requirement only.
     """
@@ -225,7 +225,7 @@ def kept_by(
 
 
 def _stops_at_red(driver: int, history: History, index: int) -> bool:
-    """Whether a driver could stop at the line of a yellow or red signal."""
+    """Whether a driver could stop at a yellow or red signal's line."""
     first = index
     while first > 0 and history.frames[first - 1].signal in (Signal.YELLOW, Signal.RED):
         if history.frames[first].ego_speed_mps < STANDING_MPS:
@@ -293,7 +293,7 @@ def _keeps_by_braking(name: str, e: Evidence, path: Path, met: MetActor | None, 
 
 
 def _within_limit(s: Floats, first: int, most_m: Floats) -> Floats:
-    """Limits the speed from frame `first` on; `most_m` is the limit's way in each step."""
+    """Limits the speed from frame `first` on to `most_m` per step."""
     steps = np.diff(s, prepend=s[:1])
     for t in range(first, len(steps)):
         steps[t] = min(steps[t], max(most_m[min(t, len(most_m) - 1)], steps[t - 1] - EASES_MPS2 * STEP_S**2))
@@ -302,7 +302,7 @@ def _within_limit(s: Floats, first: int, most_m: Floats) -> Floats:
 
 
 def _holds(gauge: Gauge, history: History, path: Path, s: Floats, acts: int) -> bool:
-    """Measures whether the requirement holds on `s` along a path from frame `acts` on, until the driver stands."""
+    """Tells whether the requirement holds on `s` from frame `acts` to standstill."""
     gauge.reset(gauge.carriageway)
     for frame, measures in zip(history.frames[: acts + 1], history.measures, strict=False):
         gauge.remember(frame, measures.signals)
@@ -320,7 +320,7 @@ def _holds(gauge: Gauge, history: History, path: Path, s: Floats, acts: int) -> 
 
 
 def _followers(history: History, t: int) -> frozenset[str]:
-    """The actors that follow the ego in frame `t`, by id: behind it, and driving its way."""
+    """Returns ids of same-direction actors behind the ego in frame `t`."""
     frame, others = history.frames[t], history.measures[t].assessment.others
     behind = others[AHEAD] + (frame.length_m[1:] + frame.length_m[0]) / 2 < 0.0
     return frozenset(np.array(frame.ids[1:])[behind & (others[COS] > 0.5)].tolist())
@@ -329,7 +329,7 @@ def _followers(history: History, t: int) -> frozenset[str]:
 def placed(
     history: History, path: Path, s: Floats, t: int, without: frozenset[str], before: Frame
 ) -> tuple[Frame, Bools]:
-    """Places the ego `s[t]` along the path in frame `t`; returns the frame and what the ego sees.
+    """Returns frame `t` and the ego's view with the ego at `s[t]`.
 
     `before` is the frame before it.
 

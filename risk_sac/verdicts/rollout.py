@@ -75,7 +75,7 @@ def drive(
     step_s: float,
     driven: Floats,
 ) -> RolloutEnd:
-    """Lets a driver brake for the striker until it stands, touches it, or the horizon is over.
+    """Brakes for the striker until standstill, touch or the horizon's end.
 
     Args:
       driver: R157, FULL_BRAKING, FUZZY or RSS.
@@ -159,7 +159,7 @@ def _wanted(
 
 @compiled
 def stopping_distance(driver: int, speed: float, grip: float) -> float:
-    """Metres in which a driver stops for what it has to perceive first, m.
+    """Returns the distance in which a driver perceives, reacts and stops, m.
 
     Its reaction and braking are those of its reference model; R157 perceives before it reacts. DEFENSIVE brakes as
     hard if it has to.
@@ -260,7 +260,7 @@ def _task(e: Evidence, path: Path, striker: int | None, conflict_frame: int) -> 
 
 @compiled
 def _acts(task: Task, released: int, latest: int, memory: Floats) -> int:
-    """The frame from which the driver drives; `memory` is then what it remembers there."""
+    """Finds the driver's first frame; sets `memory` to its state there."""
     path, speed, last, step_s = task.path, task.speed_mps, len(task.path.s) - 1, task.step_s
     slower, free = np.zeros(last, dtype=np.bool_), np.ones(last, dtype=np.bool_)
     remembered = np.empty((last, memory.shape[0], memory.shape[1]))
@@ -286,7 +286,7 @@ def _acts(task: Task, released: int, latest: int, memory: Floats) -> int:
 
 @compiled
 def _asked(task: Task, t: int, ego: OnPath, state: Floats, seen: Bools, memory: Floats) -> float:
-    """The acceleration that the driver allows itself in frame `t`, or after the last one."""
+    """Returns the driver's allowed acceleration in frame `t`, or after the last."""
     frame = min(t, len(task.path.s) - 1)
     strikes_s = _strikes_s(task.path, ego.s, ego.speed_mps, t, task.began)
     scene = SceneAhead(
@@ -306,7 +306,7 @@ def _asked(task: Task, t: int, ego: OnPath, state: Floats, seen: Bools, memory: 
 
 @compiled
 def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> float:
-    """Time until the driver reaches the place of the contact, during the recorded conflict; else inf."""
+    """Returns the time to the contact's place during the conflict; else inf."""
     last = len(path.s) - 1
     if began <= frame < last and speed > 0.0:
         to_go_m: float = path.s[last] - s
@@ -316,7 +316,7 @@ def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> fl
 
 @compiled
 def _drive(task: Task, first: int, after: int, memory: Floats) -> Floats:
-    """Metres along the path per frame, `after` frames beyond the last; the ego's own up to the `first`."""
+    """Returns path metres for all frames and `after` more, recorded until `first`."""
     path, recorded_mps, last, step_s = task.path, task.speed_mps, len(task.path.s) - 1, task.step_s
     found = np.empty(last + 1 + after)
     found[: first + 1] = path.s[: first + 1]
@@ -362,7 +362,7 @@ def _drive(task: Task, first: int, after: int, memory: Floats) -> Floats:
 
 @compiled
 def meets(path: Path, size: Size, track: MovingBox[Floats], s: Floats, acts: int, step_s: float) -> RolloutEnd:
-    """Whether what was driven along a path touches an actor, which goes on with its last velocity."""
+    """Tells whether driving `s` touches an actor that keeps its last velocity."""
     last = len(track.x) - 1
     frames = Path(track.x, track.y, track.heading, np.arange(last + 1).astype(np.float64))
     lead, passing = 0.0, 0.0

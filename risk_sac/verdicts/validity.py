@@ -29,7 +29,7 @@ class Overlap(NamedTuple):
 
 
 def overlaps_before_contact(evidence: Evidence) -> list[Overlap]:
-    """Finds the overlapping bodies of each frame, without the ego's contact in the last."""
+    """Finds overlapping bodies per frame, except the ego's contact in the last."""
     e = evidence
     pairs = _overlaps(e.x_m, e.y_m, e.heading_rad, e.length_m, e.width_m)
     return [Overlap(float(e.time_s[frame]), e.ids[i], e.ids[j]) for frame, i, j in pairs]
@@ -94,12 +94,12 @@ def artefact_verdicts(evidence: Evidence, striker: int, conflict: Conflict, fact
 
 
 def begins_after_release(time_s: float) -> bool:
-    """Whether a conflict or a violation begins late enough after the release to be no inheritance."""
+    """Whether a conflict or violation begins late enough after the release."""
     return time_s >= AFTER_RELEASE_S - 1e-6
 
 
 def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts: EpisodeFacts) -> Mapping[str, bool]:
-    """The other rules, each with whether the contact in the last frame passes it."""
+    """Returns whether the last frame's contact passes each of the other rules."""
     adversary_hit_flank = (
         contact.ego_zone in ("left", "right")
         and evidence.length_m[0] / 2 - contact.x_m > FLANK_FROM_FRONT_M
@@ -119,7 +119,7 @@ def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts:
 
 
 def cuts_off(evidence: Evidence, striker: int) -> bool:
-    """Whether the ego cut in within 3 s and left the striker no room.
+    """Whether the ego cut in within 3 s and left no room.
 
     The rule for room is that of `changes_lane_unsafely`, with the striker behind. The ego came over if it moved further
     towards the striker's way than the striker towards it.
@@ -175,7 +175,7 @@ def used_grip(evidence: Evidence, striker: int) -> Floats:
 
 @cache
 def _curvature(points: int, step_s: float) -> Floats:
-    """Weights that take `points` samples to the coefficient of t² of their least-squares quadratic."""
+    """Returns weights for the t² coefficient of a least-squares quadratic of samples."""
     t = (np.arange(points) - (points - 1) / 2) * step_s
     weights: Floats = np.linalg.pinv(np.stack((np.ones(points), t, t * t), axis=1))[2]
     return weights

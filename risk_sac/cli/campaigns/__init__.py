@@ -1,4 +1,4 @@
-"""`risk-sac campaigns`: campaigns of a running service, from a terminal or a CI job."""
+"""`risk-sac campaigns`: a service's campaigns, from a terminal or CI job."""
 
 import argparse
 import itertools
@@ -258,7 +258,7 @@ def _add_failure(parser: Parser) -> None:
 
 
 def _id_of(client: Client, campaign_id: str, named: str) -> str:
-    """Returns the id of the failure that an id, or the end of one, names.
+    """Returns the failure's id for an id or the end of one.
 
     Raises:
       ConfigError: no failure has this number, or those of several runs have.

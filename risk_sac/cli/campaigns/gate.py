@@ -1,4 +1,4 @@
-"""Compares a campaign's results with the bounds of a CI job, and writes them as JUnit XML. Pure.
+"""Compares campaign results with a CI job's bounds; writes JUnit XML. Pure.
 
 The report has a suite per family and a case per run. Each family and method has a case for each requirement that counts
 or has a bound. Where there are other bounds, it has one more. These cases fail as the exit status does.
@@ -28,7 +28,7 @@ JUDGED_BY: tuple[JudgedBy, ...] = get_args(JudgedBy)
 
 
 def named_rate(text: str) -> tuple[str, float]:
-    """Type of an argument NAME=VALUE: a requirement, and what its rate may be."""
+    """Parses an argument NAME=VALUE: a requirement and a bound of its rate."""
     name, _, value = text.partition("=")
     try:
         bound = float(value)
@@ -111,7 +111,7 @@ class BoundCheck:
 
     @property
     def verdict(self) -> Literal["above", "may be above", "within"]:
-        """Position of the rate relative to its bound; an equal one is within."""
+        """Position of the rate relative to its bound; equal is within."""
         if self.rate > self.bound:
             return "above"
         return "may be above" if self.judged_by == "interval" and self.upper > self.bound else "within"
@@ -123,7 +123,7 @@ class BoundCheck:
 
 
 def comparisons(total: Total, bounds: GateBounds) -> Iterator[BoundCheck]:
-    """ECR and PCR of a family and method, where they have a bound and have been measured."""
+    """Yields bounded and measured ECR and PCR of a family and method."""
     rates = {
         "ECR": (total.ecr, total.ecr_high, total.collisions, "valid contact"),
         "PCR": (total.pcr, total.pcr_high, total.preventable_collisions, "preventable contact"),
@@ -145,7 +145,7 @@ def comparisons(total: Total, bounds: GateBounds) -> Iterator[BoundCheck]:
 
 
 class Measured(NamedTuple):
-    """Requirements of a family and method, of all its searches or of its i.i.d. run."""
+    """Requirements of a family and method: all searches, or an i.i.d. run."""
 
     family: str
     method: str
@@ -169,7 +169,7 @@ class Measured(NamedTuple):
 
 
 def measured(results: Results) -> list[Measured]:
-    """The requirements of a campaign by family and method, those of the i.i.d. phase last."""
+    """Returns requirements by family and method, of the i.i.d. phase last."""
     drawn = [(run, run.metrics) for run in results.runs if run.method in IID_METHODS and run.metrics is not None]
     return [
         *(Measured(each.family, each.method, each.rated, each.requirements) for each in results.totals),
@@ -178,7 +178,7 @@ def measured(results: Results) -> list[Measured]:
 
 
 def excesses(total: Total, bounds: GateBounds) -> Iterator[str]:
-    """In words, what a family and method has found more of than it may, as it was counted."""
+    """Yields the counts that exceed a family and method's bounds, in words."""
     if bounds.preventable is not None and total.distinct_preventable > bounds.preventable:
         found = counted(total.distinct_preventable, "distinct preventable failure")
         yield f"{found}, where {bounds.preventable} may be"
@@ -188,7 +188,9 @@ def excesses(total: Total, bounds: GateBounds) -> Iterator[str]:
 
 
 def verdict(results: Results, bounds: GateBounds) -> tuple[int, str]:
-    """Judge a campaign, which counts as measured once it has succeeded: the exit status, and why.
+    """Judges a campaign; returns exit status and reason.
+
+    One that did not succeed counts as not measured.
 
     Raises:
       ConfigError: a bound is of a requirement that the campaign does not have.
@@ -232,7 +234,7 @@ def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
 def junit(
     results: Results, service_url: str, url: str, bounds: GateBounds, failures: Mapping[str, Sequence[Episode]]
 ) -> JUnitXml:
-    """Write the report of a campaign; `failures` has the first failures of a run by its id.
+    """Returns a campaign's report; `failures` maps run ids to first failures.
 
     A run is an error where it failed or was cancelled, and names its failures whatever the bounds are.
     """
@@ -288,7 +290,7 @@ def _case(run: RunResult, named: str) -> TestCase:
 
 
 def _requirements(group: Measured, bounds: GateBounds, names: "Names") -> Iterator[TestCase]:
-    """A case for each requirement of a family and method that counts or has a bound."""
+    """Yields a case for each requirement that counts or has a bound."""
     compared = {each.name: each for each in group.comparisons(bounds)}
     for name, requirement in group.requirements.items():
         if requirement.counts != "failure" and name not in compared:
@@ -302,7 +304,7 @@ def _requirements(group: Measured, bounds: GateBounds, names: "Names") -> Iterat
 
 
 def _gate(total: Total, bounds: GateBounds, names: "Names") -> TestCase:
-    """Whether a family and method keeps the bounds that are of no single requirement, over all its runs."""
+    """Returns a case for bounds on ECR, PCR and counts, all runs."""
     case = TestCase("all seeds", printable(f"{total.family}.{total.method}"))
     named = names.of_method(total.family, total.method)
     _judge(case, list(comparisons(total, bounds)), list(excesses(total, bounds)), names.state, named)
@@ -310,7 +312,7 @@ def _gate(total: Total, bounds: GateBounds, names: "Names") -> TestCase:
 
 
 def _judge(case: TestCase, found: Sequence[BoundCheck], exceeded: Sequence[str], state: State, named: str) -> None:
-    """Fails a case whose rate or count is beyond its bound; `named` has its failures."""
+    """Fails a case beyond its bounds; `named` lists its failures."""
     broken = [each for each in found if each.verdict != "within"]
     said = "; ".join([*(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found), *exceeded])
     if state != "succeeded":
@@ -330,7 +332,7 @@ def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Failures of a campaign in words, each with the command that shows it."""
+    """Failures of a campaign in words, each with its show command."""
 
     results: Results
     service_url: str
@@ -361,7 +363,7 @@ class Names:
         return "\n\n".join(named for run in runs if (named := self.of_run(run)))
 
     def of_requirement(self, group: Measured, requirement: str) -> str:
-        """Those of the first failures that violate a requirement, and the command that lists all."""
+        """Lists first failures that violate a requirement, and a command for all."""
         lines = [
             line
             for run in self.results.runs
@@ -380,7 +382,7 @@ class Names:
 
 
 def _versions(runs: Sequence[RunResult]) -> dict[str, str]:
-    """Software that produced the results; more than one version of it where it was changed in between."""
+    """Returns the software of the results, with several versions if changed meanwhile."""
     versions_by_name: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, version in run.versions.items():

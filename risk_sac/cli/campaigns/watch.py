@@ -1,4 +1,4 @@
-"""`risk-sac campaigns` submit, watch and results: follows a campaign and judges its results."""
+"""`risk-sac campaigns` submit, watch, results: follows a campaign and judges results."""
 
 import argparse
 import itertools
@@ -105,7 +105,7 @@ def _add_watch_flags(parser: Parser) -> None:
 
 
 def _prepare(options: argparse.Namespace) -> GateBounds:
-    """Checks the bounds and makes the report's folder, so that nothing is waited for in vain."""
+    """Checks bounds and makes the report's folder, before any waiting."""
     bounds = GateBounds.of(options)
     if options.junit is not None:
         options.junit.parent.mkdir(parents=True, exist_ok=True)
@@ -113,7 +113,7 @@ def _prepare(options: argparse.Namespace) -> GateBounds:
 
 
 def _check_names(bounds: GateBounds, spec: CampaignSpec) -> None:
-    """Refuses a bound of a requirement that no campaign ships and this one does not add."""
+    """Refuses bounds of requirements neither shipped nor added by the campaign."""
     if bounds.requirements:
         from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
 
@@ -223,7 +223,7 @@ class _Lines:
 
 
 def _network_id(client: Client, called: object) -> object:
-    """Returns the id of the uploaded network with a label; the service refuses unknown ones."""
+    """Returns an uploaded network's id by label; the service refuses unknown ones."""
     matches = [network for network in client.networks() if called in (network.id, network.label)]
     if len(matches) > 1:
         ids = ", ".join(network.id for network in matches)
@@ -232,7 +232,7 @@ def _network_id(client: Client, called: object) -> object:
 
 
 def _uploaded(name_or_file: str, url: str | None) -> str:
-    """Returns the name of a scenario in the service; a file is uploaded with its nets."""
+    """Returns a scenario's name in the service; uploads a file with nets."""
     if not is_file(name_or_file):
         return name_or_file
     document, folder = document_at(name_or_file)
@@ -278,7 +278,7 @@ def add_campaign_command(
     example: str,
     newest: bool = False,
 ) -> Parser:
-    """Adds a command on one campaign, by default the newest where that is allowed; returns its parser."""
+    """Adds a one-campaign command, optionally defaulting to the newest; returns its parser."""
     parser = add_command(commands, name, run, summary, example=example)
     default = " (default: the newest)" if newest else ""
     parser.add_argument("id", nargs="?" if newest else None, metavar="ID", help=f"id of the campaign{default}")
@@ -286,7 +286,7 @@ def add_campaign_command(
 
 
 def chosen_id(client: Client, options: argparse.Namespace) -> str:
-    """Returns the id of the campaign that the command line names, or of the newest.
+    """Returns the named campaign's id, or that of the newest.
 
     Raises:
       ConfigError: the service has no campaign.
@@ -307,7 +307,7 @@ def line(campaign: CampaignSummary) -> str:
 
 
 def figures(campaign: CampaignSummary) -> str:
-    """Returns the findings of a campaign in words, and the reason of its state."""
+    """Returns a campaign's findings in words, with its state's reason."""
     progress = campaign.progress
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
@@ -322,7 +322,7 @@ def figures(campaign: CampaignSummary) -> str:
 
 
 def _by_requirement(campaign: CampaignSummary) -> str:
-    """In brackets, how many failures of the searches violate each requirement; empty without any."""
+    """Counts searches' failures by requirement, in brackets; empty without any."""
     runs = campaign.runs if isinstance(campaign, Campaign) else []
     searches = [run.metrics for run in runs if run.metrics is not None and run.method not in IID_METHODS]
     found = pooled_requirements(searches)
@@ -331,7 +331,7 @@ def _by_requirement(campaign: CampaignSummary) -> str:
 
 
 def results_tables(results: Results, bounds: GateBounds) -> Group:
-    """Returns the funnel and the requirements of each family and method; broken bounds are red."""
+    """Returns funnel and requirements by family and method, broken bounds in red."""
     groups = {f"{group.family} {group.method}": group for group in measured(results)}
     said = {
         (name, each.name): f"above {each.bound:g}" if each.verdict == "above" else f"may be above {each.bound:g}"
@@ -345,7 +345,7 @@ def results_tables(results: Results, bounds: GateBounds) -> Group:
 
 
 def results_table(results: Results, bounds: GateBounds) -> Table:
-    """Per family and method the funnel, and ECR and PCR over their intervals; 80 columns hold it.
+    """Funnel, ECR and PCR by family and method, in 80 columns.
 
     The title has the headline failures of the campaign: what several methods found alike counts once there.
     Failures, distinct and preventable ones are of every requirement that counts. In brackets are those that R157, FSM
@@ -376,7 +376,7 @@ def results_table(results: Results, bounds: GateBounds) -> Table:
 
 
 def driven_by_table(results: Results) -> Table | None:
-    """A line for each family and method: episodes and headline failures by what drove them; None where unknown."""
+    """Counts episodes and headline failures by `DrivenBy`; None where unknown."""
     if not any(total.episodes_driven_by for total in results.totals):
         return None
     table = Table(title="episodes driven by (of them headline failures)", box=SIMPLE_HEAD, padding=0)

@@ -1,1 +1,1 @@
-"""Egos in processes of their own, which speak the protocol of `ego.proto`; needs the extra `remote`."""
+"""Egos in their own processes, by `ego.proto`; needs the extra `remote`."""

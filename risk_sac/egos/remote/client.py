@@ -38,7 +38,7 @@ class RemoteEgo:
     """
 
     def __init__(self, name: str, address: str, version: str, deadline_s: float) -> None:
-        """Does not connect yet: replays fork after this, and a connection does not survive that.
+        """Creates the client unconnected: replays fork later, and no connection survives that.
 
         Args:
           name: of the registered ego; errors name it, and never the address.
@@ -76,7 +76,7 @@ class RemoteEgo:
         self._stream = self._steps(reply.socket)
 
     def _steps(self, socket: str) -> "_Stream | LocalStream":
-        """Returns the stream of the session's steps, over the ego's local socket if that can be reached."""
+        """Returns the steps' stream, by the ego's local socket if reachable."""
         if socket:
             with contextlib.suppress(OSError):  # the ego is on another machine
                 return LocalStream(socket, self._deadline_s, LONGEST)

@@ -119,7 +119,7 @@ def observation(perceived: Perceived, session: str, new_path: bool) -> Any:
 
 
 def perceived_of(message: Any, path: Floats) -> Perceived:
-    """Returns what the ego perceives; `path` is the latest one that was sent."""
+    """Returns what the ego perceives; `path` is the latest one sent."""
     actors = message.actors
     state = np.full((WIDTH + 1, len(actors.id)), np.nan)
     state[[*ROWS.values()], :] = [getattr(actors, name) for name in ROWS]
@@ -140,7 +140,7 @@ def perceived_of(message: Any, path: Floats) -> Perceived:
 
 
 def path_of(message: Any) -> Floats:
-    """Returns the rows of `risk_sac.egos.driving`, and below them cosine and sine of the heading."""
+    """Returns rows of `risk_sac.egos.driving`, plus the heading's cosine and sine."""
     heading = np.array(message.heading_rad)
     return np.array([*(getattr(message, name) for name in PATH), np.cos(heading), np.sin(heading)])
 
@@ -153,7 +153,7 @@ def command_message(command: Command, time_s: float) -> Any:
 
 
 def command_of(message: Any) -> Command | None:
-    """Returns what the ego commands; None if it is neither control nor trajectory."""
+    """Returns the ego's command; None if neither control nor trajectory."""
     if message.HasField("control"):
         return Control(message.control.accel_mps2, message.control.steering_rad)
     if message.HasField("trajectory"):
@@ -182,7 +182,7 @@ class Framed:
         self._connection.sendall(PREFIX.pack(len(message)) + message)
 
     def receive(self, until: float | None = None) -> bytes:
-        """Returns the next message; `until` is the latest monotonic time to wait for it.
+        """Returns the next message; waits until monotonic time `until` at most.
 
         Raises:
           TimeoutError: it does not come in time.

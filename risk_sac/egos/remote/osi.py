@@ -33,7 +33,7 @@ LIGHT_ID, LANE_ID, BOUNDARY_ID, LOGICAL_ID = (1 << 32) + 2, 1 << 33, 1 << 34, 1 
 
 
 def road_message(road: Road) -> bytes:
-    """Returns the part of `osi3.GroundTruth` that stays the same in an episode; bytes of messages can be joined."""
+    """Returns an episode's constant part of `osi3.GroundTruth`; message bytes can be joined."""
     numbers = {lane.id: number for number, lane in enumerate(road.lanes)}
     truth = osi_pb2.GroundTruth(
         lane=[_lane(lane, numbers, road) for lane in road.lanes],
@@ -45,7 +45,7 @@ def road_message(road: Road) -> bytes:
 
 
 def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
-    """Returns a light for each stop line, at its lane's end, assigned to the lane behind."""
+    """Returns a light per stop line, assigned to the lane beyond it."""
     lanes = {lane.id: (number, lane) for number, lane in enumerate(road.lanes)}
     messages: list[Mapping[str, Any]] = []
     for number, (line, signal) in enumerate(zip(road.stop_lines, signals, strict=True)):
@@ -136,7 +136,7 @@ SIGNAL_ID = 1 << 32  # id of the one signal ahead; beyond the ids of actors
 
 
 class OsiEgo(ABC):
-    """Base of egos that speak OSI; they declare `version` and `response_time_s` as any other."""
+    """Base of egos that speak OSI; they declare `version` and `response_time_s`."""
 
     @abstractmethod
     def drive(self, ground_truth: bytes) -> bytes:
@@ -168,7 +168,7 @@ class OsiEgo(ABC):
 
 
 def ground_truth(perceived: Perceived, numbers: dict[str, int], road: Road) -> bytes:
-    """Returns what an ego perceives as `osi3.GroundTruth`; new actors are added to the numbers by id."""
+    """Returns perceptions as `osi3.GroundTruth`; adds new actors to `numbers`."""
     p = perceived
     for id_ in p.ids:
         numbers.setdefault(id_, len(numbers) + 1)

@@ -1,4 +1,4 @@
-"""CommonRoad XML, version 2020a: lanelets and traffic lights, everybody's trajectory, and the ego's planning problem.
+"""CommonRoad XML 2020a: lanelets, lights, trajectories, and the ego's planning problem.
 
 In one file the ego is the planning problem alone; in the other one its recorded trajectory is an obstacle as well.
 Source: https://gitlab.lrz.de/tum-cps/commonroad-scenarios, documentation/XML_commonRoad_2020a.pdf

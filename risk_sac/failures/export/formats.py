@@ -1,4 +1,4 @@
-"""Writes exports: XML, the JSON beside them, and one file or one folder, whole or not at all."""
+"""Writes exports: XML, its JSON, and a file or folder, atomically."""
 
 import io
 import json
@@ -90,7 +90,7 @@ def names(of: Literal["failure", "episodes"]) -> list[FormatName]:
 
 
 def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
-    """Raises a ConfigError for a format that cannot hold this, or that lacks a package."""
+    """Raises a `ConfigError` if a format cannot hold this or lacks packages."""
     format_ = FORMATS[name]
     if format_.of != of:
         lacks = "no single failure" if of == "failure" else "no episodes of runs"
@@ -133,7 +133,7 @@ def add(parent: ET.Element, name: str, text: object = "", /, **attributes: objec
 
 
 def beside(failure: Recorded, lacks: tuple[str, ...]) -> bytes:
-    """Returns the JSON of what the format cannot carry, which `lacks` says in words."""
+    """Returns the JSON of what the format cannot carry (`lacks`, in words)."""
     manifest, series = failure.manifest, failure.series
     ids = [actor.id for actor in failure.actors]
     told = {

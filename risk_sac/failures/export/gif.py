@@ -42,7 +42,7 @@ class Canvas:
             self._pen.polygon(self._placed(surface.outline), fill=GROUND[surface.use], outline=EDGE)
 
     def heads(self, net: Net, letters: Mapping[str, bytes]) -> None:
-        """Draws the signal heads at the end of each lane; `letters` are SUMO's, by signal."""
+        """Draws signal heads at lanes' ends; `letters` are SUMO's, by signal."""
         r = 0.35 * self._scale
         for lane in net.lanes.values():
             for place, head in enumerate(lane.heads if lane.use != "crossing" else []):
@@ -54,7 +54,7 @@ class Canvas:
     def body(
         self, pose: tuple[float, float, float], size_m: tuple[float, float], tone: str, *, person: bool, known: bool
     ) -> None:
-        """Draws a body: a person as a circle, a vehicle with a light patch to the front."""
+        """Draws a person as circle, a vehicle with a light front patch."""
         fill = tone if known else None
         if person:
             ring = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
@@ -105,7 +105,7 @@ def files(failure: Recorded) -> Files:
 
 
 def _palette() -> Image.Image:
-    """Returns all colours and their mixtures with each ground: a palette by frequency loses small bodies."""
+    """Returns all colours and mixtures: a palette by frequency loses small bodies."""
     tones = np.array(
         [ImageColor.getrgb(tone) for tone in (EGO, STRIKER, OTHER, INK, "#ffffff", EDGE, *LIGHTS.values())]
     )
@@ -119,7 +119,7 @@ def _palette() -> Image.Image:
 
 
 def _middles(failure: Recorded, first: int, last: int) -> list[Floats]:
-    """Returns the middle of each picture: at last the ego's place, before it its surroundings."""
+    """Returns each picture's middle, which follows the ego and ends at it."""
     path = np.column_stack((failure.ego.x_m, failure.ego.y_m))[: last + 1]
     middle = path[-1]
     middles: list[Floats] = []

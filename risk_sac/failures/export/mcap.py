@@ -1,4 +1,4 @@
-"""MCAP with foxglove schemas: actors, measures and moments on one clock, and `beside.json` as an attachment."""
+"""MCAP with foxglove schemas: actors, measures, moments on one clock; `beside.json` attached."""
 
 import io
 import json

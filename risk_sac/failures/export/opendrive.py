@@ -41,7 +41,7 @@ class ReferenceLine:
         return float(self.stations_m[-1])
 
     def knots(self) -> tuple[Floats, Floats, Floats]:
-        """Returns how a line beside the polyline is seen from this line, which bends around the corners.
+        """Maps lines beside the polyline to this line, which bends around corners.
 
         One that is moved by d to the left of the polyline lies (d - shift) stretch to the left of this line.
 
@@ -146,7 +146,7 @@ LANE_TYPES = {"lane": "driving", "inside": "driving", "sidewalk": "sidewalk"}
 
 @dataclass(frozen=True, slots=True)
 class ExportedRoad:
-    """Lanes side by side; those inside a junction lead from one lane to another."""
+    """Lanes side by side; inside a junction, one way between two lanes."""
 
     name: str
     lanes: Sequence[NetLane]  # from left to right
@@ -207,7 +207,7 @@ def opendrive(net: Net, name: str) -> bytes:
 
 
 def _turns(net: Net) -> Iterator[tuple[NetLane, Sequence[NetLane], NetLane | None]]:
-    """Yields each way across a junction: the lane before it, those inside it, and the lane after it."""
+    """Yields ways across junctions: lane before, lanes inside, and lane after."""
     for start in net.lanes.values():
         if start.use == "inside":
             continue
@@ -228,7 +228,7 @@ def _road(lanes: Sequence[NetLane], number: int) -> ExportedRoad:
 
 
 def _turn(number: int, start: NetLane, inside: Sequence[NetLane], end: NetLane | None) -> ExportedRoad:
-    """Lays a road along lanes inside a junction, with the directions of the roads before and after it."""
+    """Lays a road along lanes inside a junction, tangent to its neighbours."""
     points = np.concatenate([inside[0].centre[:1], *(lane.centre[1:] for lane in inside)])
     height_m = np.concatenate([inside[0].height_m[:1], *(lane.height_m[1:] for lane in inside)])
     way_out = None if end is None else _way(end.centre[:2])

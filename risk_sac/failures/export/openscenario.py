@@ -42,7 +42,7 @@ LAST_S = 20.0  # that a free ego may take
 
 @dataclass(frozen=True)
 class World:
-    """Road file of a failure, and names of its actors and bodies in it."""
+    """Road file of a failure, and names of its actors and bodies."""
 
     road: str
     content: bytes
@@ -71,7 +71,7 @@ def files(failure: Recorded) -> Files:
 
 
 def own_world(failure: Recorded) -> World | None:
-    """Returns the road and names of the file that a failure's scenario was imported from, if it was."""
+    """Returns road and names of an imported scenario's file; None for others."""
     family = failure.manifest.spec.family
     if not library.KEPT.fullmatch(family):
         return None
@@ -161,7 +161,7 @@ def _category(categories: Any, body: Body) -> Any:
 
 
 def _place(actor: ExportedActor, frame: int) -> xosc.WorldPosition:
-    """Returns the place of the rear axle's middle; of a pedestrian, its own."""
+    """Returns the rear axle's middle; of a pedestrian, its own place."""
     heading = float(actor.heading_rad[frame])
     back_m = 0.0 if actor.body.shape in ("person", "block") else REAR_AXLE * actor.length_m
     x, y = actor.x_m[frame] - back_m * np.cos(heading), actor.y_m[frame] - back_m * np.sin(heading)
@@ -174,7 +174,7 @@ def _speed(actor: ExportedActor) -> xosc.AbsoluteSpeedAction:
 
 
 def _group(actor: ExportedActor, *, leaves: bool) -> xosc.ManeuverGroup:
-    """An actor that follows its trajectory, and is taken away where it left the net."""
+    """Returns maneuvers: following the trajectory, and deletion where the actor left."""
     trajectory = xosc.Trajectory(f"{actor.id} recorded", closed=False)
     times = [float(t) for t in actor.time_s]
     trajectory.add_shape(xosc.Polyline(times, [_place(actor, frame) for frame in range(len(times))]))

@@ -1,4 +1,4 @@
-"""Writes Parquet: a row for every episode of runs; the columns are the fields of the records.
+"""Writes Parquet: a row per episode; columns are the records' fields.
 
 A record within a record is a struct, and a mapping is a map.
 """
@@ -36,7 +36,7 @@ SCALARS: Mapping[Any, pa.DataType] = {bool: pa.bool_(), int: pa.int64(), float: 
 
 
 def files(runs: Sequence[Path]) -> Files:
-    """Returns one file, with a row group for each run's folder; a ConfigError if one holds no run.
+    """Returns a file, a row group per run; `ConfigError` for other folders.
 
     Two runs that differ in their specs and share an id get the digest of their specs behind it.
     """
@@ -63,7 +63,7 @@ def files(runs: Sequence[Path]) -> Files:
 
 
 def _rows(folder: Path, results: RunResults, id_: str) -> list[dict[str, Any]]:
-    """Returns the rows of one run; failures that did not repeat are refused."""
+    """Returns a run's rows; refuses failures that did not repeat."""
     file = folder / EPISODES
     try:
         records = tuple(records_from_lines(file.read_bytes()))
@@ -87,7 +87,7 @@ def _rows(folder: Path, results: RunResults, id_: str) -> list[dict[str, Any]]:
 
 
 def _verdict(record: EpisodeRecord) -> dict[str, Any]:
-    """Returns plausibility, severity, fault and prevention of a failure; empty for other episodes."""
+    """Returns a failure's plausibility, severity, fault and prevention; otherwise empty."""
     worst = record.worst_violation if record.outcome is Outcome.FAILURE else None
     if worst is None:
         return {}

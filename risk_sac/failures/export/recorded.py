@@ -1,4 +1,4 @@
-"""A failure as the formats need it: actors, their motion in each frame, and what the signals showed."""
+"""A failure for export: actors, their motion, and the signals by frame."""
 
 import math
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ BEYOND_M = 60.0  # into the last road, where a free ego has been through what th
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportedActor:
-    """A road user; its arrays have a row for each frame until it left the net."""
+    """A road user; arrays have a row per frame until it left."""
 
     id: str
     body: Body
@@ -48,7 +48,7 @@ class ExportedActor:
 
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """A failure from its first frame, 1.5 s before the adversaries' release, to a contact or the horizon."""
+    """A failure from 1.5 s before the release to contact or horizon."""
 
     manifest: Manifest
     series: Series
@@ -114,7 +114,7 @@ class Recorded:
 
     @property
     def moment(self) -> int:
-        """The first frame in which the violation is seen; of a contact, the last."""
+        """The first frame that shows the violation; for contacts, the last."""
         after_s = self.released_s + self.violation.time_s
         return min(math.ceil(after_s / STEP_S - 1e-6), self.frames - 1)
 
@@ -184,7 +184,7 @@ def _check(manifest: Manifest, series: Series) -> None:
 
 
 def goal(failure: Recorded) -> tuple[NetLane, Floats]:
-    """Returns a free ego's goal: lane, x, y and heading on its last road."""
+    """Returns a free ego's goal: lane, and pose on its last road."""
     start = failure.layout.ego
     lanes, last = failure.net.lanes, start.route[-1]
     reached, ahead = None, [lanes[f"{start.route[0]}_{start.lane}"]]
@@ -203,7 +203,7 @@ def goal(failure: Recorded) -> tuple[NetLane, Floats]:
 
 
 def _place(line: Floats, along_m: float) -> Floats:
-    """x, y and heading so far along a line, or at its end."""
+    """Returns the pose `along_m` along a line, at most at its end."""
     sides = np.diff(line, axis=0)
     lengths = np.linalg.norm(sides, axis=1)
     station = np.concatenate(([0.0], np.cumsum(lengths)))
@@ -214,7 +214,7 @@ def _place(line: Floats, along_m: float) -> Floats:
 
 
 def cycle(failure: Recorded, signal: str) -> list[tuple[int, str]]:
-    """Returns steps and letters of a signal's phases from the first frame on.
+    """Returns steps and letters of a signal's phases from the first frame.
 
     These are of its program, or of the recording where that differs.
     """

@@ -39,7 +39,7 @@ VehicleState = dict[str, Any]
 
 @dataclass(slots=True)
 class SumoLog:
-    """Options that SUMO was started with, the commands before each step, and the vehicles after it."""
+    """SUMO's options, the commands before each step, and the vehicles after."""
 
     options: list[str] = field(default_factory=list)
     calls: list[list[Call]] = field(default_factory=lambda: [[]])
@@ -48,7 +48,7 @@ class SumoLog:
 
 @contextmanager
 def _tapped() -> Iterator[SumoLog]:
-    """Records the calls of this process to libsumo; `risk_sac.sim` calls it as a module, so none is missed."""
+    """Records this process's calls to libsumo, which `risk_sac.sim` calls as a module."""
     log = SumoLog()
 
     def start(command: list[str], own: Any = libsumo.start) -> None:
@@ -102,7 +102,7 @@ def _state(id_: str) -> VehicleState:
 
 
 def files(failure: Recorded) -> Files:
-    """Plays the failure again, and returns its files; a SimulationError if it does not repeat here."""
+    """Replays the failure and returns its files; `SimulationError` if it differs."""
     manifest = failure.manifest
     with _tapped() as log, closing(RiskSacEnv.of(manifest.spec)) as env:
         repeated(env, manifest.spec, manifest.episode, failure.series)
@@ -131,7 +131,7 @@ def _configuration(failure: Recorded, log: SumoLog) -> bytes:
 
 
 def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
-    """Returns names and values of a command line's options; that of a flag is true."""
+    """Returns names and values of command-line options; "true" for flags."""
     pairs: list[tuple[str, str]] = []
     for word in words:
         if word.startswith("-") and not word.lstrip("-")[:1].isdigit():
@@ -148,7 +148,7 @@ def _commands(failure: Recorded, log: SumoLog) -> bytes:
 
 
 def _fcd(failure: Recorded, log: SumoLog) -> bytes:
-    """Returns floating car data as SUMO's own output has it, but in full precision."""
+    """Returns floating car data in SUMO's format, but in full precision."""
     root = ET.Element("fcd-export")
     root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot express "))
     walkers = [actor for actor in failure.actors if actor.pedestrian]

@@ -1,4 +1,4 @@
-"""Replays the failure that lies beside this file in SUMO itself, and compares every vehicle with the recording.
+"""Replays the failure beside this file in SUMO, and compares all vehicles.
 
     python replay.py [--gui] [--sumo BINARY]
 
@@ -63,7 +63,7 @@ def main() -> int:
 
 
 def replay(replayed: Commands, steps: list[ET.Element], gui: bool) -> tuple[float, int]:
-    """The largest difference of any number, and how many vehicles were elsewhere than in the recording."""
+    """Returns the largest difference, and how many vehicles were elsewhere."""
     difference, missed = 0.0, 0
     for commands, recorded in zip(replayed["commands"], steps, strict=True):
         for domain, function, arguments, named in commands:
