@@ -1,4 +1,4 @@
-"""CommonRoad's reactive planner as an ego in its own process and environment.
+"""CommonRoad's reactive planner as an ego, which runs in a process and an environment of its own.
 
 Source: Werling et al. 2010, 2012; package `commonroad-reactive-planner`. Settings are the package's own, where no
 comment says otherwise.
@@ -28,7 +28,7 @@ SLOWEST_MPS = 0.01  # the package takes 0 for "not given"
 
 
 class Reactive:
-    """Reactive planner: samples in a Frenet frame, keeps the cheapest collision-free one."""
+    """Reactive planner: samples in a Frenet frame, keeps the cheapest that collides with no prediction."""
 
     version = "2025.1"
     response_time_s = 0.5
@@ -56,7 +56,7 @@ class Reactive:
         self._heading: float | None = None
 
     def act(self, perceived: Perceived) -> Control:
-        """Plans each third step and follows; brakes hard without a plan."""
+        """Plans each third step and follows the plan; without one it brakes hard."""
         ego = perceived.state[:, 0]
         turned = 0.0 if self._heading is None else math.remainder(ego[HEADING] - self._heading, math.tau)
         self._heading = float(ego[HEADING])
@@ -73,7 +73,7 @@ class Reactive:
         """Releases nothing."""
 
     def _planned(self, p: Perceived, yaw_rate: float) -> Trajectory | None:
-        """Plans from the ego's state; None without a feasible, free sample."""
+        """Plans from where the ego is; None if no sample is feasible and free."""
         planner = self._planner
         if p.path is not self._path:
             self._path = p.path
@@ -118,7 +118,7 @@ class Reactive:
         return Trajectory(time_s, x + rear_m * np.cos(headings), y + rear_m * np.sin(headings), speeds)
 
     def _others(self, p: Perceived) -> pycrcc.CollisionChecker:
-        """Predicts others at constant velocity, except vehicles behind in its lane."""
+        """Predicts all others at their velocity, but for vehicles behind in its lane, which react."""
         checker = pycrcc.CollisionChecker()
         for x, y, yaw, vx, vy, length, width in p.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH]][
             :, in_view(p)
