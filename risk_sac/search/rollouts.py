@@ -262,7 +262,7 @@ def played(
         driver = control(method, family, proposal.seed)
         driver.begin(proposal.genes)
         return play(guarded, proposal, driver, driver, reward)
-    learner = SnapshotActor(proposal.policy, proposal.seed, view and view.begin)
+    learner = SnapshotActor(proposal.policy, proposal.seed, None if view is None else view.begin)
     if proposal.guided:
         actor = ScriptFollower(family)
         actor.begin(proposal.genes)

@@ -20,7 +20,7 @@ from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.lab.pretraining.episodes import HELD_OUT, drawn_ego, training_egos
 from risk_sac.lab.pretraining.fit import held_out_documents
-from risk_sac.lab.pretraining.rollouts import DECISION_STEPS, DISCOUNT, PolicyEpisode, Turn, play_turn
+from risk_sac.lab.pretraining.rollouts import DECISION_STEPS, DISCOUNT, Driver, PolicyEpisode, Turn, play_turn
 from risk_sac.run_folder import checkpoint
 from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.agent import check_device
@@ -175,7 +175,7 @@ class PolicyTraining:
     def _turns(self) -> Iterator[Turn]:
         stage = self._stage(self._round)
         warm = stage is not self._stages[0] or self._decisions >= stage.decisions
-        networks = self._networks() if warm else None
+        policy: Driver = self._networks() if warm else "scripts"
         for stream in range(TURNS):
             random = np.random.default_rng((self.seed, self._round, stream))
             paper = [name for name in self._families if name in PAPER_FAMILIES]
@@ -184,8 +184,8 @@ class PolicyTraining:
             egos = egos_of(family, held_out=False)
             name = drawn_ego(egos, random, stage.sound)
             key = (self.seed, self._round, stream, 1)
-            driven = None if stream < SCRIPTED else networks
-            yield Turn(family, egos[name], name, key, EPISODES, driven, stage.reward)
+            driver: Driver = "scripts" if stream < SCRIPTED else policy
+            yield Turn(family, egos[name], name, key, EPISODES, driver, stage.reward)
 
     def _networks(self) -> tuple[Layers, Layers]:
         """Returns the policy and the first critic as they are now."""
@@ -215,12 +215,13 @@ class PolicyTraining:
 
     def _evaluated(self, pool: Executor) -> dict[str, Any]:
         """Plays held-out egos in turn; the scenes are the same each time."""
-        networks, turns = self._networks(), []
+        policy, turns = self._networks(), []
         for i in range(EVALUATION_TURNS):
             family = self._evaluated_in[i % len(self._evaluated_in)]
             egos = egos_of(family, held_out=True)
             name = list(egos)[i % len(egos)]
-            turns.append(Turn(family, egos[name], name, (self.seed, i, 2), EPISODES, networks, RewardConfig()))
+            key = (self.seed, i, 2)
+            turns.append(Turn(family, egos[name], name, key, EPISODES, policy, RewardConfig(), exploring=False))
         return _shares(_in_order([pool.submit(play_turn, turn) for turn in turns]))
 
     def _state(self) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,11 @@ from risk_sac.world.types import Floats, Vector
 DECISION_STEPS, DISCOUNT = AgentConfig().decision_steps, AgentConfig().discount
 SCRIPTS = 64  # of which the script model chooses one
 ACTIVE = Genes._fields.index("active")
-Act = Callable[[Vector], Vector]
 COST_WEIGHT = 0.05  # of C_soft in the reward
+
+
+Driver = tuple[Layers, Layers] | Literal["scripts", "random"]
+"""Policy and critic; scripts that the script model chooses; or all adversaries by uniformly random actions."""
 
 
 class Turn(NamedTuple):
@@ -42,8 +45,9 @@ class Turn(NamedTuple):
     name: str  # of the ego
     key: tuple[int, ...]
     episodes: int
-    networks: tuple[Layers, Layers] | None  # policy and critic; None: scripts that the script model chooses
+    driver: Driver
     reward: RewardConfig
+    exploring: bool = True  # whether a share of the policy's attackers is drawn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +100,7 @@ class Player:
         problem = env.problem
         unit, seed = random.random(problem.space.dimension), int(random.integers(1 << 30))
         attack, decision = AttackerView(problem).begin(random), Decision(DECISION_STEPS, DISCOUNT)
-        act = _acting(turn.networks, attack, random) if turn.networks else self._script(env, turn.name, unit, random)
+        act = _acting(env, turn, attack, unit, random)
         decisions: list[Transition] = []
         steps, ended = 0, False
         try:
@@ -126,31 +130,40 @@ class Player:
             attacker=-1 if attack.attacker is None else attack.attacker,
         )
 
-    def _script(self, env: RiskSacEnv, ego: str, unit: Floats, random: np.random.Generator) -> Act:
-        """Follows that of some random scripts of one attacker that most likely fails the ego, by the script model."""
-        problem, model = env.problem, shipped_model()
-        genes = random.random((SCRIPTS, len(problem.family.adversaries), SIZE))
-        genes[:, :, ACTIVE] = 0.0
-        genes[np.arange(SCRIPTS), random.integers(genes.shape[1], size=SCRIPTS), ACTIVE] = 1.0
-        points = np.concatenate([np.tile(unit, (SCRIPTS, 1)), genes.reshape(SCRIPTS, -1)], 1)
-        known = np.array([float(name == ego) for name in model.egos])
-        belief = known if known.any() else model.unknown()
-        prediction = model.predict(Tokenizer(problem).batch(points), belief)
-        follower = ScriptFollower(problem.family)
-        follower.begin(genes[prediction.fails.argmax()].ravel())
-        return follower.act
 
-
-def _acting(networks: tuple[Layers, Layers], attack: Attack, random: np.random.Generator) -> Act:
-    """Returns what draws an attacker's actions, each held for a decision."""
-    layers, critic = networks
-    policy, held = FrozenPolicy(tuple(layers), ACTION_SIZE, normalised=True), Held(DECISION_STEPS)
-
-    def decide(observation: Vector) -> Vector:
-        seen = attack.seen(observation, partial(own_value, policy, critic), explore=True)
-        return attack.acted(explored(respond(layers, seen, normalised=True), "squashed", random))
-
+def _acting(
+    env: RiskSacEnv, turn: Turn, attack: Attack, unit: Floats, random: np.random.Generator
+) -> Callable[[Vector], Vector]:
+    """Returns what acts on each observation; actions that are not a script's are held for a decision."""
+    if turn.driver == "scripts":
+        return _script(env, turn.name, unit, random)
+    held, decide = Held(DECISION_STEPS), partial(_decided, turn, env.action_size, attack, random)
     return lambda observation: held.act(partial(decide, observation))
+
+
+def _script(env: RiskSacEnv, ego: str, unit: Floats, random: np.random.Generator) -> Callable[[Vector], Vector]:
+    """Follows that of some random scripts of one attacker that most likely fails the ego, by the script model."""
+    problem, model = env.problem, shipped_model()
+    genes = random.random((SCRIPTS, len(problem.family.adversaries), SIZE))
+    genes[:, :, ACTIVE] = 0.0
+    genes[np.arange(SCRIPTS), random.integers(genes.shape[1], size=SCRIPTS), ACTIVE] = 1.0
+    points = np.concatenate([np.tile(unit, (SCRIPTS, 1)), genes.reshape(SCRIPTS, -1)], 1)
+    known = np.array([float(name == ego) for name in model.egos])
+    belief = known if known.any() else model.unknown()
+    prediction = model.predict(Tokenizer(problem).batch(points), belief)
+    follower = ScriptFollower(problem.family)
+    follower.begin(genes[prediction.fails.argmax()].ravel())
+    return follower.act
+
+
+def _decided(turn: Turn, size: int, attack: Attack, random: np.random.Generator, observation: Vector) -> Vector:
+    """Draws a joint action."""
+    if isinstance(turn.driver, str):
+        return random.uniform(-1.0, 1.0, size).astype(np.float32)
+    layers, critic = turn.driver
+    value = partial(own_value, FrozenPolicy(tuple(layers), ACTION_SIZE, normalised=True), critic)
+    seen = attack.seen(observation, value, turn.exploring)
+    return attack.acted(explored(respond(layers, seen, normalised=True), "squashed", random))
 
 
 def _transition(

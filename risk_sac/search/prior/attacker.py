@@ -15,12 +15,12 @@ from risk_sac.env.observation_layout import (
     LATERAL_EGO,
     PER_ADVERSARY,
     PER_EGO,
-    PER_STATIC,
 )
 from risk_sac.env.problem import Problem
 from risk_sac.search.agents.transition import Transition
+from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.search.prior.tokens import ACTOR_EVEN, ACTOR_ODD, SCENE_EVEN, SCENE_ODD, Tokenizer
-from risk_sac.world.types import Vector
+from risk_sac.world.types import Floats, Vector
 
 PER_ACTOR = ACTOR_EVEN + ACTOR_ODD + PER_ADVERSARY
 INPUT_SIZE = 3 * PER_ACTOR + PER_EGO + SCENE_EVEN + SCENE_ODD + 2  # attacker, sum and maximum; robustness, time left
@@ -46,10 +46,8 @@ class AttackerView:
         ego = PER_ADVERSARY * self.adversaries
         scene = ego + PER_EGO
         robustness = scene + problem.space.dimension
-        statics = robustness + len(problem.requirements)
         self._ego, self._scene = slice(ego, scene), slice(scene, robustness)
-        self._robustness = slice(robustness, statics)
-        self._statics = slice(statics, statics + PER_STATIC * len(problem.family.statics))
+        self._robustness = slice(robustness, robustness + len(problem.requirements))
 
     def begin(self, random: np.random.Generator) -> "Attack":
         """Begins an episode; the generator is of what it draws at its start."""
@@ -63,7 +61,7 @@ class AttackerView:
         """Whether an adversary is at the ego's right."""
         return bool(self.motion(observation)[attacker, ASIDE] < 0.0)
 
-    def seen(self, observation: Vector, attacker: int, *, mirrored: bool) -> Vector:
+    def seen(self, observation: Vector, attacker: int, mirrored: bool) -> Vector:
         """Returns the policy's input, `INPUT_SIZE`."""
         tokens = self._tokenizer.of_scene(np.clip(observation[self._scene].astype(np.float64), 0.0, 1.0))
         live = np.zeros((len(tokens.actors), PER_ADVERSARY), np.float32)
@@ -81,11 +79,18 @@ class AttackerView:
 class Attack:
     """An episode as its attacker's policy sees it."""
 
-    def __init__(self, view: AttackerView, luck: float, place: float) -> None:
-        """Args: two draws from [0, 1): whether the attacker is drawn, and which it is then."""
+    def __init__(self, view: AttackerView, luck: float = 1.0, place: float = 0.0, attacker: int | None = None) -> None:
+        """Begins an episode.
+
+        Args:
+          view: of the problem.
+          luck: draw from [0, 1) that decides whether the attacker is drawn.
+          place: draw from [0, 1) that decides which it is then.
+          attacker: place among the adversaries; None: not chosen yet.
+        """
         self._view, self._luck, self._place = view, luck, place
-        self.attacker: int | None = None
-        self._mirrored = False
+        self.attacker = attacker
+        self._mirrored: bool | None = None
 
     def seen(self, observation: Vector, value: Callable[[Vector], float], explore: bool) -> Vector:
         """Returns the policy's input; chooses the attacker at the first decision.
@@ -96,19 +101,11 @@ class Attack:
           explore: whether a share of the attackers is drawn uniformly.
         """
         if self.attacker is None:
-            present = np.flatnonzero(self._view.motion(observation).any(1))
-            inputs = [self._begun(observation, each) for each in present.tolist() or [0]]
-            if explore and self._luck < OTHER_ATTACKERS:
-                chosen = int(self._place * len(inputs))
-            else:
-                chosen = int(np.argmax([value(each) for each in inputs])) if len(inputs) > 1 else 0
-            self._attack_with(present.tolist()[chosen] if len(present) else 0, observation)
-        assert self.attacker is not None
-        return self._view.seen(observation, self.attacker, mirrored=self._mirrored)
+            self.attacker = self._chosen(observation, value, explore)
+        return self._seen(observation)
 
     def acted(self, action: Vector) -> Vector:
         """Returns the joint action of a policy's action."""
-        assert self.attacker is not None  # since it has seen
         joint = np.zeros((self._view.adversaries, ACTION_SIZE), np.float32)
         joint[self.attacker] = action * ACTION_MIRROR if self._mirrored else action
         return joint.ravel()
@@ -116,27 +113,40 @@ class Attack:
     def transition(self, step: Transition) -> Transition | None:
         """Returns a decision as the policy sees it; None before any adversary has acted.
 
-        Of an episode that another process or a script has driven the attacker is the one that acts most in the first
-        decision in which any acts.
+        Where a script or another process drives, the attacker is the one that acts most in the first decision in which
+        any acts.
         """
-        acts = np.abs(step.action).reshape(-1, ACTION_SIZE)
         if self.attacker is None:
-            if not acts.any():
+            if not step.action.any():
                 return None
-            self._attack_with(int(acts.sum(1).argmax()), step.observation)
-        assert self.attacker is not None
+            self.attacker = most_active(step.action)
+        seen = self._seen(step.observation)
         own = step.action.reshape(-1, ACTION_SIZE)[self.attacker]
-        return replace(
-            step,
-            observation=self._view.seen(step.observation, self.attacker, mirrored=self._mirrored),
-            action=own * ACTION_MIRROR if self._mirrored else own,
-            next_observation=self._view.seen(step.next_observation, self.attacker, mirrored=self._mirrored),
-        )
+        action = own * ACTION_MIRROR if self._mirrored else own
+        return replace(step, observation=seen, action=action, next_observation=self._seen(step.next_observation))
 
-    def _begun(self, observation: Vector, attacker: int) -> Vector:
-        mirrored = self._view.on_the_right(observation, attacker)
-        return self._view.seen(observation, attacker, mirrored=mirrored)
+    def _chosen(self, observation: Vector, value: Callable[[Vector], float], explore: bool) -> int:
+        """Returns the adversary of the greatest value, or a drawn one, among those on the net."""
+        present: list[int] = np.flatnonzero(self._view.motion(observation).any(1)).tolist() or [0]
+        if explore and self._luck < OTHER_ATTACKERS:
+            return present[int(self._place * len(present))]
+        sides = [self._view.on_the_right(observation, each) for each in present]
+        inputs = [self._view.seen(observation, *each) for each in zip(present, sides, strict=True)]
+        return present[int(np.argmax([value(each) for each in inputs]))]
 
-    def _attack_with(self, attacker: int, observation: Vector) -> None:
-        self.attacker = attacker
-        self._mirrored = self._view.on_the_right(observation, attacker)
+    def _seen(self, observation: Vector) -> Vector:
+        assert self.attacker is not None
+        if self._mirrored is None:
+            self._mirrored = self._view.on_the_right(observation, self.attacker)
+        return self._view.seen(observation, self.attacker, self._mirrored)
+
+
+def most_active(actions: Floats | Vector) -> int:
+    """Returns the adversary that acts most in joint actions."""
+    return int(np.abs(actions).reshape(-1, actions.shape[-1] // ACTION_SIZE, ACTION_SIZE).sum((0, 2)).argmax())
+
+
+def going_on(policy: FrozenPolicy, problem: Problem, actions: Floats) -> Callable[[Vector], Vector]:
+    """Returns what lets a frozen policy drive on after recorded joint actions, `T x a`."""
+    attack = Attack(AttackerView(problem), attacker=most_active(actions))
+    return lambda observation: attack.acted(policy(attack.seen(observation, lambda seen: 0.0, explore=False)))
