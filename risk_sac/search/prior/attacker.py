@@ -68,9 +68,9 @@ class AttackerView:
         live[: self.adversaries] = self.motion(observation)
         actors = np.concatenate([tokens.actors, live], 1)
         others = np.delete(actors, attacker, 0)
-        peak = others[np.abs(others).argmax(0), np.arange(PER_ACTOR)]
-        least = observation[self._robustness].min(initial=1.0)
-        rest = np.array([least, observation[-1]], np.float32)
+        most, least = others.max(0), others.min(0)
+        peak = np.where(most >= -least, most, least)  # the greatest magnitude, with its sign
+        rest = np.array([observation[self._robustness].min(initial=1.0), observation[-1]], np.float32)
         parts = actors[attacker], observation[self._ego], tokens.scene, others.sum(0), peak, rest
         seen: Vector = np.concatenate(parts, dtype=np.float32)
         return seen * INPUT_MIRROR if mirrored else seen
