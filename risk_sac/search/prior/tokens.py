@@ -21,8 +21,7 @@ from risk_sac.scenario.lane_places import lane_line, lanes_ahead
 from risk_sac.scenario.layout import LEAD_IN_S, BodyStart, Layout, PedestrianStart, StaticStart, VehicleStart
 from risk_sac.scenario.limits import Conditions, Limits, conditions, limits_from_odd
 from risk_sac.scenario.travel_line import TravelLine, line_of
-from risk_sac.search.agents.controls import PASSIVE
-from risk_sac.search.scripts import SAME_WAY_COS, SIZE, Genes
+from risk_sac.search.scripts import PASSIVE, SAME_WAY_COS, SIZE, Genes
 from risk_sac.world.net import Net, NetLane
 from risk_sac.world.types import Floats, Role
 
