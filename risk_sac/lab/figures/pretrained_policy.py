@@ -16,7 +16,8 @@ from risk_sac.egos.registry import pinned
 from risk_sac.lab.pretraining.rollouts import Driver, Turn, play_turn
 from risk_sac.scenario.reading import shipped_names
 from risk_sac.search.frozen_policy import network
-from risk_sac.search.prior.policy import read_policy, shipped_policy
+from risk_sac.search.prior.files import DATA
+from risk_sac.search.prior.policy import POLICY, read_policy
 
 EPISODES = 10  # of a turn
 
@@ -33,39 +34,27 @@ def main() -> None:
     parser.add_argument("egos", nargs="+", metavar="EGO")
     parser.add_argument("--scenario", dest="families", nargs="+", choices=shipped_names(), default=["low"])
     parser.add_argument("--policy", type=Path, metavar="FILE")
+    parser.add_argument("--drivers", nargs="+", choices=("policy", "random", "scripts"), default=("policy", "random"))
     parser.add_argument("--seed", type=int, default=301)
     parser.add_argument("--episodes", type=int, default=60)
     options = parser.parse_args()
-    pretrained = read_policy(options.policy) if options.policy else shipped_policy()
-    drivers: dict[str, Driver] = {
-        "policy": (network(pretrained.policy), network(pretrained.critics)),
-        "random": "random",
-        "scripts": "scripts",
-    }
+    pretrained = None if "policy" not in options.drivers else read_policy(options.policy or DATA / POLICY)
+    networks = pretrained and (network(pretrained.policy), network(pretrained.critics))
     print("| scenario | ego | driven by | failures | distinct | candidates, distinct | attackers | steps |")
     print("|---" * 8 + "|")
-    for family, name, (driver, drives) in product(options.families, options.egos, drivers.items()):
-        played = [
-            episode
+    for family, name, drives in product(options.families, options.egos, options.drivers):
+        driver: Driver = networks if networks and drives == "policy" else drives
+        rest = EPISODES, driver, RewardConfig(), False
+        turns = [
+            Turn(family, ego_of(name), name, (options.seed, turn), *rest)
             for turn in range(options.episodes // EPISODES)
-            for episode in play_turn(
-                Turn(
-                    family,
-                    ego_of(name),
-                    name,
-                    (options.seed, turn),
-                    EPISODES,
-                    drives,
-                    RewardConfig(),
-                    exploring=False,
-                )
-            )
         ]
+        played = [episode for turn in turns for episode in play_turn(turn)]
         failed = [each for each in played if each.kind]
         kinds, candidates = {each.kind for each in failed}, {each.kind for each in failed if each.candidate}
         attackers = sorted(Counter(each.attacker for each in failed).items())
         counts = f"{len(failed)} of {len(played)} | {len(kinds)} | {len(candidates)} | {attackers}"
-        print(f"| {family} | `{name}` | {driver} | {counts} | {sum(each.steps for each in played)} |", flush=True)
+        print(f"| {family} | `{name}` | {drives} | {counts} | {sum(each.steps for each in played)} |", flush=True)
 
 
 if __name__ == "__main__":
