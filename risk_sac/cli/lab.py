@@ -38,6 +38,7 @@ from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
 WRITTEN_EVERY_S = 60.0
+EPISODES = "episodes"
 SHOWN = ("method", "falsification rate (95 %)", "median steps", "restricted mean steps (95 %)", "p (log-rank)")
 
 
@@ -213,7 +214,7 @@ def _fit_scripts(options: argparse.Namespace, pool: Executor) -> None:
     from risk_sac.lab.pretraining.fit import Dataset, fit, library_of
     from risk_sac.search.prior.shipped import MODEL, write_library, write_model
 
-    episodes: Path = options.out / "episodes"
+    episodes: Path = options.out / EPISODES
     episodes.mkdir(exist_ok=True)
     families = options.families or shipped_names()
     wanted = [(family, options.seed, k) for k in range(options.streams) for family in families]
@@ -238,7 +239,7 @@ def _train_policy(options: argparse.Namespace, pool: Executor) -> None:
     from risk_sac.search.prior.policy import POLICY, write_policy
 
     seed, episodes = options.seed, options.policy_episodes
-    training = PolicyTraining(seed, episodes, options.device, families=options.families)
+    training = PolicyTraining(options.out / EPISODES, seed, episodes, options.device, families=options.families)
     file: Path = options.out / POLICY
 
     def write() -> None:

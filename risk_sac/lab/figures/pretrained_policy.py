@@ -1,4 +1,4 @@
-"""Plays the frozen policy in random scenes, beside random actions and scripts that the script model chooses.
+"""Plays the frozen policy in random scenes, beside random actions.
 
     python -m risk_sac.lab.figures.pretrained_policy [--scenario low …] [--policy FILE] [--episodes 60] EGO …
 
@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("egos", nargs="+", metavar="EGO")
     parser.add_argument("--scenario", dest="families", nargs="+", choices=shipped_names(), default=["low"])
     parser.add_argument("--policy", type=Path, metavar="FILE")
-    parser.add_argument("--drivers", nargs="+", choices=("policy", "random", "scripts"), default=("policy", "random"))
+    parser.add_argument("--drivers", nargs="+", choices=("policy", "random"), default=("policy", "random"))
     parser.add_argument("--seed", type=int, default=301)
     parser.add_argument("--episodes", type=int, default=60)
     options = parser.parse_args()
@@ -43,7 +43,7 @@ def main() -> None:
     print("| scenario | ego | driven by | failures | distinct | candidates, distinct | attackers | steps |")
     print("|---" * 8 + "|")
     for family, name, drives in product(options.families, options.egos, options.drivers):
-        driver: Driver = networks if networks and drives == "policy" else drives
+        driver: Driver = networks if drives == "policy" else None
         rest = EPISODES, driver, RewardConfig(), False
         turns = [
             Turn(family, ego_of(name), name, (options.seed, turn), *rest)

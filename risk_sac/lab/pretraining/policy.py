@@ -18,9 +18,18 @@ import torch
 from risk_sac.config import EgoConfig, FamilyName, RewardConfig
 from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
 from risk_sac.egos.registry import pinned
-from risk_sac.lab.pretraining.episodes import HELD_OUT, drawn_ego, training_egos
+from risk_sac.errors import ConfigError
+from risk_sac.lab.pretraining.episodes import HELD_OUT, drawn_ego, read_episodes, training_egos
 from risk_sac.lab.pretraining.fit import held_out_documents
-from risk_sac.lab.pretraining.rollouts import DECISION_STEPS, DISCOUNT, Driver, PolicyEpisode, Turn, play_turn
+from risk_sac.lab.pretraining.rollouts import (
+    DECISION_STEPS,
+    DISCOUNT,
+    Demonstrations,
+    Driver,
+    PolicyEpisode,
+    Turn,
+    play_turn,
+)
 from risk_sac.run_folder import checkpoint
 from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.agent import check_device
@@ -30,13 +39,14 @@ from risk_sac.search.agents.transition import Transition
 from risk_sac.search.frozen_policy import Layers, network
 from risk_sac.search.prior.attacker import ACTION_SIZE, INPUT_SIZE
 from risk_sac.search.prior.policy import PretrainedPolicy
+from risk_sac.world.types import Floats
 
 SIZES = INPUT_SIZE, ACTION_SIZE
 TURNS, EPISODES = 4, 5  # of a round, and of a turn
-SCRIPTED = 1  # turns of a round in which scripts act, as demonstrations
+DEMONSTRATED = 1  # turns of a round in which scripts act that failed the ego
 PAPER_SHARE = 0.4  # of the turns, those in the paper's families
 INITIAL_DEVIATION = 1.0  # of the policy; from 0.2 it failed the egos a third as often after 1,200 episodes
-UPDATES_PER_DECISION = 1.0
+UPDATES_PER_DECISION = 1.5
 FAILING = 0.25  # share of a batch that comes from failing episodes
 EVALUATED_EVERY, EVALUATION_TURNS = 25, 7  # rounds; turns of held-out egos
 AGENT = AgentConfig(
@@ -54,7 +64,7 @@ class TrainingStage(NamedTuple):
     """A part of the training, with a memory of its own."""
 
     begins: float  # share of all episodes
-    decisions: int  # before its first update; in the first stage scripts make them
+    decisions: int  # before its first update; in the first stage demonstrations make them
     sound: float  # share of its episodes before egos without a defect
     reward: RewardConfig
 
@@ -103,6 +113,7 @@ class PolicyTraining:
 
     def __init__(
         self,
+        scripts: Path,
         seed: int,
         episodes: int,
         device: str = "cpu",
@@ -114,12 +125,16 @@ class PolicyTraining:
         """Draws the networks.
 
         Args:
+          scripts: folder of script episodes.
           seed: of all random numbers.
           episodes: to play in all, rounded up to whole rounds.
           device: where the networks are trained, `cpu` or `cuda`; episodes are played on the CPU.
           families: in which it plays; without any all that ship and are not held out.
           agent: settings of the networks and of learning.
           stages: in order; the first begins at 0.
+
+        Raises:
+          ConfigError: no device, or no scripts that failed an ego.
         """
         check_device("--device", device)
         torch.set_num_threads(1)
@@ -127,6 +142,7 @@ class PolicyTraining:
         self._rounds = math.ceil(episodes / (TURNS * EPISODES))
         apart = held_out_documents()
         self._families = tuple(families) or tuple(name for name in shipped_names() if name not in apart)
+        self._demonstrations = {name: demonstrations(scripts, name) for name in self._families}
         self._evaluated_in = tuple(families) or (*PAPER_FAMILIES, *apart)
         self.agent = SacAgent(*SIZES, agent, SAC, seed, device, normalised=True)
         self.agent.spread(INITIAL_DEVIATION)
@@ -153,7 +169,7 @@ class PolicyTraining:
                 self.replay = FailureReplay(*SIZES, REPLAY)
                 self._decisions, self._due = 0, 0.0
             self._waiting = _in_order(futures)
-            played += self._waiting[SCRIPTED * EPISODES :]  # those of the policy
+            played += self._waiting[DEMONSTRATED * EPISODES :]  # those of the policy
             self._round += 1
             if self._round % EVALUATED_EVERY == 0:
                 self.curve.append(self._point(played) | {"held_out": self._evaluated(pool)})
@@ -176,16 +192,20 @@ class PolicyTraining:
     def _turns(self) -> Iterator[Turn]:
         stage = self._stage(self._round)
         warm = stage is not self._stages[0] or self._decisions >= stage.decisions
-        policy: Driver = self._networks() if warm else "scripts"
+        demonstrated, policy = DEMONSTRATED if warm else TURNS, self._networks()
         for stream in range(TURNS):
             random = np.random.default_rng((self.seed, self._round, stream))
             paper = [name for name in self._families if name in PAPER_FAMILIES]
             among = paper if paper and random.random() < PAPER_SHARE else self._families
             family = among[random.integers(len(among))]
-            egos = egos_of(family, held_out=False)
-            name = drawn_ego(egos, random, stage.sound)
-            key = (self.seed, self._round, stream, 1)
-            driver: Driver = "scripts" if stream < SCRIPTED else policy
+            driver: Driver = policy
+            egos, key = egos_of(family, held_out=False), (self.seed, self._round, stream, 1)
+            if stream < demonstrated:
+                failed = self._demonstrations[family]
+                name = list(failed)[random.integers(len(failed))]
+                driver = Demonstrations(failed[name])
+            else:
+                name = drawn_ego(egos, random, stage.sound)
             yield Turn(family, egos[name], name, key, EPISODES, driver, stage.reward)
 
     def _networks(self) -> tuple[Layers, Layers]:
@@ -255,6 +275,23 @@ def egos_of(family: FamilyName, *, held_out: bool) -> dict[str, EgoConfig]:
     """Returns a family's training egos by name: those held out of policies, or the others."""
     egos = training_egos(family)
     return {name: pinned(ego) for name, ego in egos.items() if (name in HELD_OUT) == held_out}
+
+
+def demonstrations(folder: Path, family: FamilyName) -> dict[str, list[Floats]]:
+    """Returns the points that failed a training ego, by its name.
+
+    Raises:
+      ConfigError: the folder has none.
+    """
+    failed: dict[str, list[Floats]] = {}
+    for path in sorted(folder.glob(f"{family}-[0-9]*.npz")):
+        for episode in read_episodes(path):
+            if episode.kind and episode.ego in egos_of(family, held_out=False):
+                failed.setdefault(episode.ego, []).append(episode.point)
+    if not failed:
+        got = f"no script of {family} in {folder} that failed an ego"
+        raise ConfigError("--streams", got, remedy="play more scripts first, into the same DIR")
+    return failed
 
 
 def _in_order(futures: list["Future[list[PolicyEpisode]]"]) -> list[PolicyEpisode]:

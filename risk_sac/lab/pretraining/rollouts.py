@@ -1,10 +1,10 @@
 """Plays episodes of a policy in random scenes before the training egos."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,26 +12,30 @@ from numpy.typing import NDArray
 from risk_sac.config import AgentConfig, EgoConfig, FamilyName, LearnerConfig, RewardConfig, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
+from risk_sac.scenario.families import Family
 from risk_sac.search.agents.controls import Decision, Held, ScriptFollower
 from risk_sac.search.agents.snapshot import explored, own_value
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.frozen_policy import FrozenPolicy, Layers, respond
 from risk_sac.search.prior.attacker import ACTION_SIZE, Attack, AttackerView
-from risk_sac.search.prior.shipped import shipped_model
-from risk_sac.search.prior.tokens import Tokenizer
-from risk_sac.search.scripts import SIZE, Genes
+from risk_sac.search.scripts import PASSIVE, SIZE, Genes
 from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Floats, Vector
 
 DECISION_STEPS, DISCOUNT = AgentConfig().decision_steps, AgentConfig().discount
-SCRIPTS = 64  # of which the script model chooses one
 ACTIVE = Genes._fields.index("active")
 COST_WEIGHT = 0.05  # of C_soft in the reward
 
 
-Driver = tuple[Layers, Layers] | Literal["scripts", "random"]
-"""Policy and critic; scripts that the script model chooses; or all adversaries by uniformly random actions."""
+class Demonstrations(NamedTuple):
+    """Points whose scripts failed the ego, in the unit cube; one adversary alone acts by them."""
+
+    points: Sequence[Floats]
+
+
+Driver = tuple[Layers, Layers] | Demonstrations | None
+"""Policy and critic; scripts; or all adversaries by uniformly random actions."""
 
 
 class Turn(NamedTuple):
@@ -98,9 +102,18 @@ class Player:
     def _episode(self, env: RiskSacEnv, turn: Turn, random: np.random.Generator) -> PolicyEpisode | None:
         """Plays an episode in a random scene; None if it cannot be played."""
         problem = env.problem
-        unit, seed = random.random(problem.space.dimension), int(random.integers(1 << 30))
+        size, seed = problem.space.dimension, int(random.integers(1 << 30))
         attack, decision = AttackerView(problem).begin(random), Decision(DECISION_STEPS, DISCOUNT)
-        act = _acting(env, turn, attack, unit, random)
+        if isinstance(turn.driver, Demonstrations):
+            point = turn.driver.points[random.integers(len(turn.driver.points))]
+            unit, act = point[:size], _script(problem.family, point[size:], random)
+        else:
+            held, decide = Held(DECISION_STEPS), partial(_decided, turn, env.action_size, attack, random)
+            unit = random.random(size)
+
+            def act(observation: Vector) -> Vector:
+                return held.act(partial(decide, observation))
+
         decisions: list[Transition] = []
         steps, ended = 0, False
         try:
@@ -131,34 +144,20 @@ class Player:
         )
 
 
-def _acting(
-    env: RiskSacEnv, turn: Turn, attack: Attack, unit: Floats, random: np.random.Generator
-) -> Callable[[Vector], Vector]:
-    """Returns what acts on each observation; actions that are not a script's are held for a decision."""
-    if turn.driver == "scripts":
-        return _script(env, turn.name, unit, random)
-    held, decide = Held(DECISION_STEPS), partial(_decided, turn, env.action_size, attack, random)
-    return lambda observation: held.act(partial(decide, observation))
-
-
-def _script(env: RiskSacEnv, ego: str, unit: Floats, random: np.random.Generator) -> Callable[[Vector], Vector]:
-    """Follows that of some random scripts of one attacker that most likely fails the ego, by the script model."""
-    problem, model = env.problem, shipped_model()
-    genes = random.random((SCRIPTS, len(problem.family.adversaries), SIZE))
-    genes[:, :, ACTIVE] = 0.0
-    genes[np.arange(SCRIPTS), random.integers(genes.shape[1], size=SCRIPTS), ACTIVE] = 1.0
-    points = np.concatenate([np.tile(unit, (SCRIPTS, 1)), genes.reshape(SCRIPTS, -1)], 1)
-    known = np.array([float(name == ego) for name in model.egos])
-    belief = known if known.any() else model.unknown()
-    prediction = model.predict(Tokenizer(problem).batch(points), belief)
-    follower = ScriptFollower(problem.family)
-    follower.begin(genes[prediction.fails.argmax()].ravel())
+def _script(family: Family, genes: Floats, random: np.random.Generator) -> Callable[[Vector], Vector]:
+    """Follows the script of one of the adversaries that act by these genes, drawn uniformly."""
+    rows = genes.reshape(-1, SIZE).copy()
+    acting = np.flatnonzero(rows[:, ACTIVE] >= min(PASSIVE, rows[:, ACTIVE].max()))
+    attacker = acting[random.integers(len(acting))]
+    rows[:, ACTIVE] = np.arange(len(rows)) == attacker
+    follower = ScriptFollower(family)
+    follower.begin(rows.ravel())
     return follower.act
 
 
 def _decided(turn: Turn, size: int, attack: Attack, random: np.random.Generator, observation: Vector) -> Vector:
     """Draws a joint action."""
-    if isinstance(turn.driver, str):
+    if turn.driver is None or isinstance(turn.driver, Demonstrations):
         return random.uniform(-1.0, 1.0, size).astype(np.float32)
     layers, critic = turn.driver
     value = partial(own_value, FrozenPolicy(tuple(layers), ACTION_SIZE, normalised=True), critic)
