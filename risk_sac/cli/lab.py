@@ -170,7 +170,8 @@ def add_pretrain(commands: Commands) -> None:
         "make a prior: play scripts and train a policy before many egos",
         more="The same command again goes on with an interrupted one. It writes DIR/scripts.npz and DIR/policy.npz, one"
         " script model and one policy for all scenarios, DIR/policy.json with the curve of its training, and for each"
-        " family of the paper DIR/<family>.npz with its library. Every third shipped document by name only tests.",
+        " family of the paper DIR/<family>.npz with its library. The policy is shown scripts of DIR/episodes that"
+        " failed an ego. Every third shipped document by name only tests.",
         example="pretrain --scenario low left_turn_car --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
     )
     titles = ("scene", "script model", "policy", "execution", "output")

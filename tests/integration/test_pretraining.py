@@ -7,13 +7,16 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from risk_sac.errors import ConfigError
 from risk_sac.lab.pretraining import episodes, policy
-from risk_sac.lab.pretraining.episodes import EpisodeStream
+from risk_sac.lab.pretraining.episodes import EpisodeStream, ScriptEpisode, write_episodes
 from risk_sac.lab.pretraining.policy import PolicyTraining
+from risk_sac.scenario.families import family_named
+from risk_sac.search.prior.coordinates import Coordinates
 
 
 def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path, monkeypatch):
@@ -31,6 +34,19 @@ def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path, monkeypat
         assert (whole / name).read_bytes() == (parts / name).read_bytes()
 
 
+FAMILIES = ("low", "left_turn_car")
+
+
+def scripts(folder: Path) -> Path:
+    """Writes script episodes as if each had failed SUMO's driver."""
+    random = np.random.default_rng(0)
+    for family in FAMILIES:
+        points = random.random((5, Coordinates.of(family_named(family)).dimension))
+        failed = [ScriptEpisode(point=point, ego="default", steps=9, kind="cut-in") for point in points]
+        write_episodes(folder / f"{family}-00-0000.npz", failed)
+    return folder
+
+
 def trained(
     folder: Path,
     episodes: int,
@@ -42,7 +58,7 @@ def trained(
     """A trained policy; an interruption comes after the first point of its curve."""
     folder.mkdir()
     for points in (1, None) if interrupted else (None,):
-        training = PolicyTraining(5, episodes, families=["low", "left_turn_car"], stages=stages)
+        training = PolicyTraining(scripts(folder), 5, episodes, families=FAMILIES, stages=stages)
         with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
             list(islice(training.run(pool, folder), points))
     return training
@@ -75,7 +91,9 @@ def test_a_policy_is_the_same_however_it_was_trained(tmp_path):
     parts = trained(tmp_path / "parts", 12, 1, interrupted=True, stages=SHORT)
     assert whole.curve == parts.curve
     assert [point["episodes"] for point in whole.curve] == [6, 12]
-    assert digest(whole) == digest(parts) != digest(PolicyTraining(5, 12))  # and it has learnt
+    assert (
+        digest(whole) == digest(parts) != digest(PolicyTraining(scripts(tmp_path), 5, 12, families=FAMILIES))
+    )  # and it has learnt
 
 
 @pytest.mark.torture
@@ -86,6 +104,11 @@ def test_a_thousand_episodes_give_the_same_weights_again(tmp_path):
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="has the GPU that it must lack")
-def test_a_gpu_that_is_not_there_is_refused_in_one_line():
+def test_a_gpu_that_is_not_there_is_refused_in_one_line(tmp_path):
     with pytest.raises(ConfigError, match=r"^--device: .*no CUDA device here.*'cpu'"):
-        PolicyTraining(5, 100, "cuda")
+        PolicyTraining(tmp_path, 5, 100, "cuda")
+
+
+def test_without_scripts_that_failed_an_ego_no_policy_is_trained(tmp_path):
+    with pytest.raises(ConfigError, match=r"^--streams: no script of low .*play more scripts first"):
+        PolicyTraining(tmp_path, 5, 100, families=["low"])

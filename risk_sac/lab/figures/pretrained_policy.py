@@ -38,13 +38,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=301)
     parser.add_argument("--episodes", type=int, default=60)
     options = parser.parse_args()
-    pretrained = None if "policy" not in options.drivers else read_policy(options.policy or DATA / POLICY)
-    networks = pretrained and (network(pretrained.policy), network(pretrained.critics))
+    drivers: dict[str, Driver] = {"random": None}
+    if "policy" in options.drivers:
+        pretrained = read_policy(options.policy or DATA / POLICY)
+        drivers["policy"] = network(pretrained.policy), network(pretrained.critics)
     print("| scenario | ego | driven by | failures | distinct | candidates, distinct | attackers | steps |")
     print("|---" * 8 + "|")
     for family, name, drives in product(options.families, options.egos, options.drivers):
-        driver: Driver = networks if drives == "policy" else None
-        rest = EPISODES, driver, RewardConfig(), False
+        rest = EPISODES, drivers[drives], RewardConfig(), False
         turns = [
             Turn(family, ego_of(name), name, (options.seed, turn), *rest)
             for turn in range(options.episodes // EPISODES)

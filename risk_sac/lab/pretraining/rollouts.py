@@ -105,7 +105,7 @@ class Player:
         size, seed = problem.space.dimension, int(random.integers(1 << 30))
         attack, decision = AttackerView(problem).begin(random), Decision(DECISION_STEPS, DISCOUNT)
         if isinstance(turn.driver, Demonstrations):
-            point = turn.driver.points[random.integers(len(turn.driver.points))]
+            point = turn.driver.points[int(random.integers(len(turn.driver.points)))]
             unit, act = point[:size], _script(problem.family, point[size:], random)
         else:
             held, decide = Held(DECISION_STEPS), partial(_decided, turn, env.action_size, attack, random)
