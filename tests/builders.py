@@ -27,7 +27,8 @@ from risk_sac.records import (
     Violation,
 )
 from risk_sac.scenario.bodies import CODES
-from risk_sac.search.prior.policy import PolicyLayout, PretrainedPolicy
+from risk_sac.search.prior.attacker import ACTION_SIZE, INPUT_SIZE
+from risk_sac.search.prior.policy import PretrainedPolicy
 from risk_sac.world.types import Floats, Frame, Kind, Role, Row, Signal
 
 if TYPE_CHECKING:
@@ -268,14 +269,14 @@ def run_metrics(episodes: int = 4, **changes: Any) -> RunMetrics:
     return RunMetrics(episodes=episodes, **(values | changes))
 
 
-def pretrained_policy(layout: PolicyLayout) -> PretrainedPolicy:
+def pretrained_policy() -> PretrainedPolicy:
     """A small pretrained policy of random weights that survive half precision."""
-    random = np.random.default_rng(3)
-    seen, acted, hidden = layout.observation_size, layout.action_size, 8
+    random, hidden = np.random.default_rng(3), 8
 
     def layers(count: int, *sizes: int) -> tuple[NDArray[np.float32], ...]:
         shapes = [shape for rows, out in pairwise(sizes) for shape in ((count, rows, out), (count, 1, out))]
         return tuple(random.integers(-8, 9, shape).astype(np.float32) / 16 for shape in shapes)
 
-    policy, critics = layers(1, seen, hidden, hidden, 2 * acted), layers(2, seen + acted, hidden, hidden, 1)
-    return PretrainedPolicy("low", layout, policy, critics, 0.03, {"episodes": 12})
+    policy = layers(1, INPUT_SIZE, hidden, hidden, 2 * ACTION_SIZE)
+    critics = layers(2, INPUT_SIZE + ACTION_SIZE, hidden, hidden, 1)
+    return PretrainedPolicy(policy, critics, 0.03, {"episodes": 12})

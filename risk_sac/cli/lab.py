@@ -16,7 +16,7 @@ from rich.table import Table
 from risk_sac.cli.console import OK, folded_table, number, say
 from risk_sac.cli.flags import kept_name
 from risk_sac.cli.parser import Commands, add_command
-from risk_sac.config import FamilyName, MethodName
+from risk_sac.config import MethodName
 from risk_sac.config.base import read_text
 from risk_sac.config.methods import named_methods
 from risk_sac.egos.defects.catalogue import DEFECTS
@@ -38,6 +38,7 @@ from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
 WRITTEN_EVERY_S = 60.0
+EPISODES = "episodes"
 SHOWN = ("method", "falsification rate (95 %)", "median steps", "restricted mean steps (95 %)", "p (log-rank)")
 
 
@@ -167,9 +168,10 @@ def add_pretrain(commands: Commands) -> None:
         "pretrain",
         _pretrain,
         "make a prior: play scripts and train a policy before many egos",
-        more="The same command again goes on with an interrupted one. It writes DIR/scripts.npz, one script model for"
-        " all scenarios, and for each family of the paper DIR/<family>.npz with its library and DIR/<family>-policy.npz"
-        " with the curve of its training beside it. Every third shipped document by name only tests the model.",
+        more="The same command again goes on with an interrupted one. It writes DIR/scripts.npz and DIR/policy.npz, one"
+        " script model and one policy for all scenarios, DIR/policy.json with the curve of its training, and for each"
+        " family of the paper DIR/<family>.npz with its library. The policy is shown scripts of DIR/episodes that"
+        " failed an ego. Every third shipped document by name only tests.",
         example="pretrain --scenario low left_turn_car --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
     )
     titles = ("scene", "script model", "policy", "execution", "output")
@@ -180,16 +182,16 @@ def add_pretrain(commands: Commands) -> None:
         nargs="+",
         default=[],
         metavar="NAME_OR_FILE",
-        help=f"(default: all that ship; for policies {' '.join(PAPER_FAMILIES)})",
+        help="(default: all that ship; a policy is not trained on those held out)",
     )
     streams = "independent sequences of script episodes for each family; 0: no script model (default: %(default)s)"
     scripts.add_argument("--streams", type=number(int, 0, 100), default=4, metavar="N", help=streams)
     chunks = "chunks of 250 episodes in each stream (default: %(default)s)"
     scripts.add_argument("--chunks", type=number(int, 1, 10_000), default=50, metavar="N", help=chunks)
-    episodes = "episodes of the policy for each family; 0: no policy (default: %(default)s)"
+    episodes = "episodes of the policy; 0: none (default: %(default)s)"
     policy.add_argument("--policy-episodes", type=number(int, 0, 1_000_000), default=10_000, metavar="N", help=episodes)
     execution.add_argument("--seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
-    device = "where policies are trained; episodes are played on the CPU (default: %(default)s)"
+    device = "where the policy is trained; episodes are played on the CPU (default: %(default)s)"
     execution.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=device)
     jobs = "processes that play at a time (default: one per core)"
     execution.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
@@ -203,8 +205,7 @@ def _pretrain(options: argparse.Namespace) -> int:
         if options.streams:
             _fit_scripts(options, pool)
         if options.policy_episodes:
-            for family in options.families or PAPER_FAMILIES:
-                _train_policy(options, pool, family)
+            _train_policy(options, pool)
     return OK
 
 
@@ -214,7 +215,7 @@ def _fit_scripts(options: argparse.Namespace, pool: Executor) -> None:
     from risk_sac.lab.pretraining.fit import Dataset, fit, library_of
     from risk_sac.search.prior.shipped import MODEL, write_library, write_model
 
-    episodes: Path = options.out / "episodes"
+    episodes: Path = options.out / EPISODES
     episodes.mkdir(exist_ok=True)
     families = options.families or shipped_names()
     wanted = [(family, options.seed, k) for k in range(options.streams) for family in families]
@@ -234,19 +235,21 @@ def _fit_scripts(options: argparse.Namespace, pool: Executor) -> None:
         say(f"  {where}: {', '.join(f'{name} {value}' for name, value in scores.items())}")
 
 
-def _train_policy(options: argparse.Namespace, pool: Executor, family: FamilyName) -> None:
+def _train_policy(options: argparse.Namespace, pool: Executor) -> None:
     from risk_sac.lab.pretraining.policy import PolicyTraining
-    from risk_sac.search.prior.policy import write_policy
+    from risk_sac.search.prior.policy import POLICY, write_policy
 
-    training = PolicyTraining(family, options.seed, options.policy_episodes, options.device)
+    seed, episodes = options.seed, options.policy_episodes
+    training = PolicyTraining(options.out / EPISODES, seed, episodes, options.device, families=options.families)
+    file: Path = options.out / POLICY
 
     def write() -> None:
-        write_policy(options.out / f"{family}-policy.npz", training.pretrained())
-        (options.out / f"{family}-policy.json").write_text(json.dumps(training.curve, indent=1) + "\n")
+        write_policy(file, training.pretrained())
+        file.with_suffix(".json").write_text(json.dumps(training.curve, indent=1) + "\n")
 
     for point in training.run(pool, options.out):
         say(
-            f"{family}: after {point['episodes']} episodes of the policy {point['failing']:.3f} of the last fail,"
+            f"after {point['episodes']} episodes of the policy {point['failing']:.3f} of the last fail,"
             f" {point['held_out']['failing']:.2f} before egos held out"
         )
         write()

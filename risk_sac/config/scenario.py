@@ -325,7 +325,7 @@ class Scenario(Settings):
     horizon_s: Expression = 15.0
     """Length of an episode, at most 400."""
     like: Like | None = None
-    """Without it a search starts without a library of scripts and without a pretrained policy."""
+    """Without it a search starts without a library of scripts."""
     parameters: Annotated[Mapping[Word, ScenarioParameter], Field(max_length=100)] = {}
     rank_correlation: RankCorrelation | None = None
     """Between parameters that are drawn by their distributions; without it they are independent."""

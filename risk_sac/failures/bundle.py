@@ -29,6 +29,8 @@ from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import shipped_names
 from risk_sac.search.frozen_policy import FrozenPolicy
+from risk_sac.search.prior.attacker import ACTION_SIZE, INPUT_SIZE
+from risk_sac.search.prior.policy import starts_pretrained
 from risk_sac.search.scripts import SIZE
 from risk_sac.world.types import Scene
 
@@ -229,8 +231,10 @@ def _bundle(content: bytes, *, inner: bool = False) -> Bundle:
     _check_playable(problem, manifest, arrays)
     policy = None
     if layers:
-        policy = FrozenPolicy(layers, problem.action_size, normalised)
-        policy.check(problem.observation_size)
+        sizes = problem.observation_size, problem.action_size
+        seen, acted = (INPUT_SIZE, ACTION_SIZE) if starts_pretrained(manifest.spec, problem) else sizes
+        policy = FrozenPolicy(layers, acted, normalised)
+        policy.check(seen)
     kept = None if recorded is None else _bundle(recorded.tobytes(), inner=True)
     return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy, recorded=kept)
 

@@ -28,6 +28,9 @@ from risk_sac.failures.variants import alike
 from risk_sac.records import Collision, Violation
 from risk_sac.run_folder.results import first_of_variants, read_results
 from risk_sac.search.agents.controls import Held, ScriptFollower
+from risk_sac.search.frozen_policy import FrozenPolicy
+from risk_sac.search.prior.attacker import going_on
+from risk_sac.search.prior.policy import starts_pretrained
 from risk_sac.world.types import Floats, Scene
 
 WORSE = (Verdict.FIXED, Verdict.NOT_COMPARABLE, Verdict.NEW_KIND, Verdict.STILL_FAILING)
@@ -148,15 +151,16 @@ def _events(violations: Sequence[Collision | Violation]) -> str:
     return " and ".join(each.event for each in violations)
 
 
-def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
+def _play(spec: RunSpec, bundle: Bundle, policy: FrozenPolicy | None) -> Played:
     """Plays the recorded actions, and the rest of the horizon."""
     with closing(RiskSacEnv.of(spec)) as env:
         actions = actions_of(bundle.series)
         if policy is None:
             rest = env.problem.family.horizon_steps - len(actions)
             return _played(env, bundle, np.pad(actions, ((0, rest), (0, 0))), None)
-        held = Held(spec.learner.agent.decision_steps)
-        return _played(env, bundle, actions, lambda observation: held.act(partial(policy, observation)))
+        held, problem = Held(spec.learner.agent.decision_steps), env.problem
+        drive: Policy = going_on(policy, problem, actions) if starts_pretrained(spec, problem) else policy
+        return _played(env, bundle, actions, lambda observation: held.act(partial(drive, observation)))
 
 
 def _follow(spec: RunSpec, bundle: Bundle) -> Played:

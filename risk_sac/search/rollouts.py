@@ -35,6 +35,8 @@ from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
 from risk_sac.search.agents.controls import ScriptFollower, control
 from risk_sac.search.agents.snapshot import SnapshotActor
 from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
+from risk_sac.search.prior.attacker import AttackerView
+from risk_sac.search.prior.policy import starts_pretrained
 
 logger = logging.getLogger(__name__)
 
@@ -240,20 +242,27 @@ def serve(connection: Connection, folder: Path, number: int) -> None:
     reward = TrainingReward(method_of(spec.method), spec.learner)
     with closing(RiskSacEnv.of(spec, ego_server=number)) as env, CrashGuard(folder) as guard:
         guarded = GuardedEnv(env, guard)
+        view = AttackerView(env.problem) if starts_pretrained(spec, env.problem) else None
         while True:
             proposal: Proposal = connection.recv()
             guarded.begin(proposal.index)
-            connection.send(played(guarded, proposal, spec.method, reward))
+            connection.send(played(guarded, proposal, spec.method, reward, view))
 
 
-def played(guarded: GuardedEnv, proposal: Proposal, method: RunMethod, reward: TrainingReward) -> PlayedEpisode:
-    """Plays a proposal; with a policy, the steps are for the learner."""
+def played(
+    guarded: GuardedEnv,
+    proposal: Proposal,
+    method: RunMethod,
+    reward: TrainingReward,
+    view: AttackerView | None = None,
+) -> PlayedEpisode:
+    """Plays a proposal; with a policy, the steps are for the learner. `view` is for a policy of one adversary."""
     family, actor = guarded.env.problem.family, None
     if proposal.policy is None:
         driver = control(method, family, proposal.seed)
         driver.begin(proposal.genes)
         return play(guarded, proposal, driver, driver, reward)
-    learner = SnapshotActor(proposal.policy, proposal.seed)
+    learner = SnapshotActor(proposal.policy, proposal.seed, None if view is None else view.begin)
     if proposal.guided:
         actor = ScriptFollower(family)
         actor.begin(proposal.genes)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from risk_sac.env.observation_layout import PER_ADVERSARY, PER_STATIC, SPEED_MPS, X_M, Y_M
 from risk_sac.world.types import STEP_S
 
+PASSIVE = 0.4  # an adversary whose gene `active` is smaller does nothing, unless it is the largest of all
 EARLIEST_S = 0.5  # after the release: a contact within the first second counts against neither side
 LATEST_CUE_S = 6.0  # after that
 NEAREST_CUE_S, CUES_S = 0.3, 4.0  # from meeting the ego

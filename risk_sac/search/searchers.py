@@ -18,7 +18,7 @@ from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.learner import PretrainedLearner
-from risk_sac.search.prior.policy import PolicyLayout, check_prior, pretrained_for
+from risk_sac.search.prior.policy import check_prior, shipped_policy, starts_pretrained
 from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.search.prior.start import start_of
 from risk_sac.search.scene_optimizer import (
@@ -89,17 +89,17 @@ class Searchers:
 
     def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
         method = method_of(spec.method)
-        check_prior(spec.method, spec.family, spec.prior)
+        check_prior(spec.method, spec.prior)
         self._problem, self._space = problem, problem.space
         self._spec = spec
         self._coordinates = Coordinates.of(problem)
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
-        pretrained = None if self._start is None or not method.learns else pretrained_for(problem.family)
+        pretrained = shipped_policy() if starts_pretrained(spec, problem) else None
         self.agent: Actor  # Alg. 1, l. 2
         if not method.learns:
             self.agent = control(spec.method, problem.family, spec.stream)
         elif pretrained is not None:
-            self.agent = PretrainedLearner(pretrained, PolicyLayout.of(problem), method, spec.learner, spec.stream)
+            self.agent = PretrainedLearner(pretrained, problem, method, spec.learner, spec.stream)
         else:
             self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1

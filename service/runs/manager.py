@@ -7,7 +7,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -182,8 +181,8 @@ class Manager:
         if spec.on_end is not None:
             check_allowed(spec.on_end, self._settings.on_end)
         spec = checked_campaign(spec)
-        for family, name in product(spec.families, spec.methods):
-            check_prior(name, family, spec.prior)
+        for name in spec.methods:
+            check_prior(name, spec.prior)
         return spec
 
     def cancel(self, campaign_id: str, project: str | None = None) -> StoredCampaign:

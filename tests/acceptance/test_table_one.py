@@ -7,7 +7,6 @@ from risk_sac.env.problem import Problem
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.lab.figures.table_one import lines, uniform_ecr
 from risk_sac.search.frozen_policy import FrozenPolicy
-from risk_sac.search.prior.policy import PolicyLayout
 
 
 def row(method: str, seed: int, ecr: float, dispersion: float | None) -> Row:
@@ -30,9 +29,9 @@ def test_a_method_has_its_mean_over_the_seeds_beside_the_paper() -> None:
 
 def test_a_frozen_policy_meets_playable_scenes() -> None:
     spec = RunSpec(family="low", method="sac", seed=1)
-    layout = PolicyLayout.of(Problem.from_spec(spec))
-    size = layout.action_size
-    idle = FrozenPolicy((np.zeros((layout.observation_size, size), np.float32), np.zeros(size, np.float32)), size)
+    problem = Problem.from_spec(spec)
+    size = problem.action_size
+    idle = FrozenPolicy((np.zeros((problem.observation_size, size), np.float32), np.zeros(size, np.float32)), size)
     assert uniform_ecr(spec, idle, 2) == 0.0  # all actions 0 hardly ever lead to a contact
 
 

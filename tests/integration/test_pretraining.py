@@ -1,10 +1,9 @@
-"""Pretraining: streams and policies that are interrupted, and the mirror of transitions."""
+"""Pretraining: streams and policies that are interrupted."""
 
 import hashlib
 import multiprocessing
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import closing
 from itertools import islice
 from pathlib import Path
 
@@ -12,16 +11,12 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.config import EgoConfig, RunSpec
-from risk_sac.env.env import RiskSacEnv
-from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.lab.pretraining import episodes, policy
-from risk_sac.lab.pretraining.episodes import EpisodeStream
+from risk_sac.lab.pretraining.episodes import EpisodeStream, ScriptEpisode, write_episodes
 from risk_sac.lab.pretraining.policy import PolicyTraining
-from risk_sac.search.prior.mirror import Mirror
-from risk_sac.search.prior.policy import PolicyLayout
-from risk_sac.world.types import Scene, Vector
+from risk_sac.scenario.families import family_named
+from risk_sac.search.prior.coordinates import Coordinates
 
 
 def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path, monkeypatch):
@@ -39,6 +34,19 @@ def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path, monkeypat
         assert (whole / name).read_bytes() == (parts / name).read_bytes()
 
 
+FAMILIES = ("low", "left_turn_car")
+
+
+def scripts(folder: Path) -> Path:
+    """Writes script episodes as if each had failed SUMO's driver."""
+    random = np.random.default_rng(0)
+    for family in FAMILIES:
+        points = random.random((5, Coordinates.of(family_named(family)).dimension))
+        failed = [ScriptEpisode(point=point, ego="default", steps=9, kind="cut-in") for point in points]
+        write_episodes(folder / f"{family}-00-0000.npz", failed)
+    return folder
+
+
 def trained(
     folder: Path,
     episodes: int,
@@ -50,7 +58,7 @@ def trained(
     """Trains a policy; an interruption comes after the curve's first point."""
     folder.mkdir()
     for points in (1, None) if interrupted else (None,):
-        training = PolicyTraining("low", 5, episodes, stages=stages)
+        training = PolicyTraining(scripts(folder), 5, episodes, families=FAMILIES, stages=stages)
         with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
             list(islice(training.run(pool, folder), points))
     return training
@@ -83,7 +91,9 @@ def test_a_policy_is_the_same_however_it_was_trained(tmp_path):
     parts = trained(tmp_path / "parts", 12, 1, interrupted=True, stages=SHORT)
     assert whole.curve == parts.curve
     assert [point["episodes"] for point in whole.curve] == [6, 12]
-    assert digest(whole) == digest(parts) != digest(PolicyTraining("low", 5, 12))  # and it has learnt
+    assert (
+        digest(whole) == digest(parts) != digest(PolicyTraining(scripts(tmp_path), 5, 12, families=FAMILIES))
+    )  # and it has learnt
 
 
 @pytest.mark.torture
@@ -94,46 +104,11 @@ def test_a_thousand_episodes_give_the_same_weights_again(tmp_path):
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="has the GPU that it must lack")
-def test_a_gpu_that_is_not_there_is_refused_in_one_line():
+def test_a_gpu_that_is_not_there_is_refused_in_one_line(tmp_path):
     with pytest.raises(ConfigError, match=r"^--device: .*no CUDA device here.*'cpu'"):
-        PolicyTraining("low", 5, 100, "cuda")
+        PolicyTraining(tmp_path, 5, 100, "cuda")
 
 
-TOLERANCE = 0.03  # SUMO's cars on the right slow down a little for those on their left
-SCENE = {
-    "ego_speed_mps": 12.0,
-    "lead_gap_m": 20.0,
-    "lead_speed_mps": 11.0,
-    "left_offset_m": 4.0,
-    "left_speed_mps": 12.0,
-    "right_offset_m": -6.0,
-    "right_speed_mps": 10.0,
-    "follower_gap_m": 25.0,
-    "friction": 0.9,
-}
-MIRRORED = SCENE | {"left_offset_m": -6.0, "left_speed_mps": 10.0, "right_offset_m": 4.0, "right_speed_mps": 12.0}
-
-
-def observations(env: RiskSacEnv, scene: dict[str, float], actions: list[Vector]) -> list[Vector]:
-    seen = [env.reset(seed=3, options={"scene": Scene(family="low", values=scene)})[0]]
-    return seen + [env.step(action)[0] for action in actions]
-
-
-def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does():
-    spec = RunSpec(family="low", method="sac", seed=3, ego=EgoConfig(driver="idm-aeb"))  # SUMO's driver keeps right
-    mirror = Mirror.of(PolicyLayout.of(Problem.from_spec(spec)))
-    assert mirror is not None
-    # Both brake: before the release their accelerations differ by side, and the count of pedals has a threshold.
-    actions = [np.array([0.0, 0.0, -0.5, -0.5, -0.3, 0.2], np.float32)] * 8
-    with closing(RiskSacEnv.of(spec)) as env:
-        seen = observations(env, SCENE, actions)
-        mirrored = observations(env, MIRRORED, [mirror.action(action) for action in actions])
-    assert not np.allclose(seen[-1], mirrored[-1], atol=10 * TOLERANCE)  # the scene has two unlike sides
-    for own, other in zip(seen, mirrored, strict=True):
-        np.testing.assert_allclose(mirror.observation(own), other, atol=TOLERANCE)
-        np.testing.assert_array_equal(mirror.observation(mirror.observation(own)), own)
-
-
-def test_families_with_unlike_sides_have_no_mirror():
-    for family in ("mixed", "dense"):
-        assert Mirror.of(PolicyLayout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=3)))) is None
+def test_without_scripts_that_failed_an_ego_no_policy_is_trained(tmp_path):
+    with pytest.raises(ConfigError, match=r"^--streams: no script of low .*play more scripts first"):
+        PolicyTraining(tmp_path, 5, 100, families=["low"])

@@ -1,5 +1,6 @@
 """Plays episodes of a policy in random scenes before the training egos."""
 
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -11,20 +12,34 @@ from numpy.typing import NDArray
 from risk_sac.config import AgentConfig, EgoConfig, FamilyName, LearnerConfig, RewardConfig, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
-from risk_sac.search.agents.controls import Decision, Held
-from risk_sac.search.agents.networks import LOG_STD_HALF, LOG_STD_MIDDLE
+from risk_sac.scenario.families import Family
+from risk_sac.search.agents.controls import Decision, Held, ScriptFollower
+from risk_sac.search.agents.snapshot import explored, own_value
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import Encounter
-from risk_sac.search.frozen_policy import Layers, respond
+from risk_sac.search.frozen_policy import FrozenPolicy, Layers, respond
+from risk_sac.search.prior.attacker import ACTION_SIZE, Attack, AttackerView
+from risk_sac.search.scripts import PASSIVE, SIZE, Genes
 from risk_sac.verdicts.distinct import variant_name
-from risk_sac.world.types import Vector
+from risk_sac.world.types import Floats, Vector
 
 DECISION_STEPS, DISCOUNT = AgentConfig().decision_steps, AgentConfig().discount
+ACTIVE = Genes._fields.index("active")
 COST_WEIGHT = 0.05  # of C_soft in the reward
 
 
+class Demonstrations(NamedTuple):
+    """Points whose scripts failed the ego, in the unit cube; one adversary alone acts by them."""
+
+    points: Sequence[Floats]
+
+
+Driver = tuple[Layers, Layers] | Demonstrations | None
+"""Policy and critic; scripts; or all adversaries by uniformly random actions."""
+
+
 class Turn(NamedTuple):
-    """Episodes to play before one ego.
+    """Episodes to play in one scenario before one ego.
 
     A turn's random numbers follow from its key alone, so turns may be played in any order and process.
     """
@@ -34,29 +49,30 @@ class Turn(NamedTuple):
     name: str  # of the ego
     key: tuple[int, ...]
     episodes: int
-    layers: Layers | None  # of the policy; None: uniformly random actions
+    driver: Driver
     reward: RewardConfig
+    exploring: bool = True  # whether a share of the policy's attackers is drawn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicyEpisode:
-    """One episode of a policy."""
+    """One episode of an attacker."""
 
+    family: str
     ego: str
-    decisions: list[Transition]  # the reward in `risk_reward`
+    decisions: list[Transition]  # as the policy sees them; the reward in `risk_reward`
     kind: str  # of its worst failure; empty without one
     candidate: bool  # for the headline
     steps: int
+    attacker: int  # place among the adversaries; -1: none acted
 
 
 def play_turn(turn: Turn) -> list[PolicyEpisode]:
     """Plays a turn in this process; scenes that cannot be played are drawn again."""
-    player = _player(turn.family)
-    random = np.random.default_rng(turn.key)
-    return player.play(turn, random)
+    return _player(turn.family).play(turn, np.random.default_rng(turn.key))
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=64)
 def _player(family: FamilyName) -> "Player":
     return Player(family)
 
@@ -78,54 +94,75 @@ class Player:
         played: list[PolicyEpisode] = []
         with closing(self._envs[key]) as env:
             while len(played) < turn.episodes:
-                episode = _episode(env, turn, random)
+                episode = self._episode(env, turn, random)
                 if episode is not None:
                     played.append(episode)
         return played
 
+    def _episode(self, env: RiskSacEnv, turn: Turn, random: np.random.Generator) -> PolicyEpisode | None:
+        """Plays an episode in a random scene; None if it cannot be played."""
+        problem = env.problem
+        size, seed = problem.space.dimension, int(random.integers(1 << 30))
+        attack, decision = AttackerView(problem).begin(random), Decision(DECISION_STEPS, DISCOUNT)
+        if isinstance(turn.driver, Demonstrations):
+            point = turn.driver.points[int(random.integers(len(turn.driver.points)))]
+            unit, act = point[:size], _script(problem.family, point[size:], random)
+        else:
+            held, decide = Held(DECISION_STEPS), partial(_decided, turn, env.action_size, attack, random)
+            unit = random.random(size)
 
-def _episode(env: RiskSacEnv, turn: Turn, random: np.random.Generator) -> PolicyEpisode | None:
-    """Plays an episode in a random scene; None if it cannot be played."""
-    space = env.problem.space
-    scene, seed = space.from_unit(random.random(space.dimension)), int(random.integers(1 << 30))
-    held, decision = Held(DECISION_STEPS), Decision(DECISION_STEPS, DISCOUNT)
-    decisions: list[Transition] = []
-    size = env.action_size
-    steps, ended = 0, False
-    try:
-        observation, info = env.reset(seed=seed, options={"scene": scene})
-        while not ended and steps < env.problem.family.horizon_steps:
-            action = held.act(partial(_decided, turn.layers, observation, size, random))
-            before = observation
-            observation, risk_reward, terminated, truncated, info = env.step(action)
-            steps += 1
-            ended = terminated or truncated
-            reward = risk_reward - COST_WEIGHT * info["cost"]
-            step = _transition(before, action, reward, observation, terminated=terminated)
-            decided = decision.add(step)
-            if decided is not None:
-                decisions.append(decided)
-    except (InfeasibleScene, EgoFailed):
-        return None
-    violations = env.violations(env.requirement_results())
-    met = Encounter(collision=info.get("collision"), violations=violations)
-    worst = met.worst
-    return PolicyEpisode(
-        ego=turn.name,
-        decisions=decisions,
-        kind="" if worst is None else variant_name(worst),
-        candidate=worst is not None and worst.headline_candidate,
-        steps=steps,
-    )
+            def act(observation: Vector) -> Vector:
+                return held.act(partial(decide, observation))
+
+        decisions: list[Transition] = []
+        steps, ended = 0, False
+        try:
+            observation, info = env.reset(seed=seed, options={"scene": problem.space.from_unit(unit)})
+            while not ended and steps < problem.family.horizon_steps:
+                action, before = act(observation), observation
+                observation, risk_reward, terminated, truncated, info = env.step(action)
+                steps += 1
+                ended = terminated or truncated
+                reward = risk_reward - COST_WEIGHT * info["cost"]
+                decided = decision.add(_transition(before, action, reward, observation, terminated=terminated))
+                seen = None if decided is None else attack.transition(decided)
+                if seen is not None:
+                    decisions.append(seen)
+        except (InfeasibleScene, EgoFailed):
+            return None
+        violations = env.violations(env.requirement_results())
+        met = Encounter(collision=info.get("collision"), violations=violations)
+        worst = met.worst
+        return PolicyEpisode(
+            family=self._family,
+            ego=turn.name,
+            decisions=decisions,
+            kind="" if worst is None else variant_name(worst),
+            candidate=worst is not None and worst.headline_candidate,
+            steps=steps,
+            attacker=-1 if attack.attacker is None else attack.attacker,
+        )
 
 
-def _decided(layers: Layers | None, observation: Vector, size: int, random: np.random.Generator) -> Vector:
-    """Draws an action of a tanh-Gaussian policy; uniform without one."""
-    if layers is None:
+def _script(family: Family, genes: Floats, random: np.random.Generator) -> Callable[[Vector], Vector]:
+    """Follows the script of one of the adversaries that act by these genes, drawn uniformly."""
+    rows = genes.reshape(-1, SIZE).copy()
+    acting = np.flatnonzero(rows[:, ACTIVE] >= min(PASSIVE, rows[:, ACTIVE].max()))
+    attacker = acting[random.integers(len(acting))]
+    rows[:, ACTIVE] = np.arange(len(rows)) == attacker
+    follower = ScriptFollower(family)
+    follower.begin(rows.ravel())
+    return follower.act
+
+
+def _decided(turn: Turn, size: int, attack: Attack, random: np.random.Generator, observation: Vector) -> Vector:
+    """Draws a joint action."""
+    if turn.driver is None or isinstance(turn.driver, Demonstrations):
         return random.uniform(-1.0, 1.0, size).astype(np.float32)
-    mean, raw = np.split(respond(layers, observation, normalised=True), 2)
-    deviation = np.exp(LOG_STD_HALF * np.tanh(raw) + LOG_STD_MIDDLE)
-    return np.tanh(mean + deviation * random.standard_normal(size)).astype(np.float32)
+    layers, critic = turn.driver
+    value = partial(own_value, FrozenPolicy(tuple(layers), ACTION_SIZE, normalised=True), critic)
+    seen = attack.seen(observation, value, turn.exploring)
+    return attack.acted(explored(respond(layers, seen, normalised=True), "squashed", random))
 
 
 def _transition(

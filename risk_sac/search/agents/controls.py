@@ -11,7 +11,7 @@ from risk_sac.env.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.records import DrivenBy
 from risk_sac.scenario.families import Family
 from risk_sac.search.agents.transition import Transition
-from risk_sac.search.scripts import SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
+from risk_sac.search.scripts import PASSIVE, SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
 from risk_sac.world.types import STEP_S, Floats, Vector
 
 if TYPE_CHECKING:
@@ -117,7 +117,6 @@ class ScriptedAgent(NonLearner):
         return np.stack((drive, steer), axis=1).ravel().astype(np.float32)
 
 
-PASSIVE = 0.4  # an adversary whose gene `active` is smaller does nothing, unless it is the largest of all
 BEHIND_M, BEHIND_STEPS = 6.0, 8  # so far and so long behind the ego, it no longer strikes
 STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits for a signal, or for a queue
 

@@ -172,9 +172,10 @@ class Learner:
         self._steps += own or not self._acted
         if self._method.lagrangian and priced:
             self.dual_variable = dual_step(self.dual_variable, transition.cost, self._config.lagrangian)  # l. 15-16
-        decided = self._decision.add(self._seen(transition))
-        if decided is not None:
-            self._replay.add(decided)  # Alg. 1, l. 12
+        decided = self._decision.add(transition)
+        seen = None if decided is None else self._seen(decided)
+        if seen is not None:
+            self._replay.add(seen)  # Alg. 1, l. 12
 
     def update(self) -> "UpdateResult | None":
         """Learns from memory at `updates_per_step`; None in the warm-up and between updates.
@@ -225,9 +226,9 @@ class Learner:
         self._held.begin()
         self._decision.begin()
 
-    def _seen(self, transition: Transition) -> Transition:
-        """Returns a step as the networks see it."""
-        return transition
+    def _seen(self, decided: Transition) -> Transition | None:
+        """Returns a decision as the networks see it; None: they do not."""
+        return decided
 
     def _taken(self) -> PolicySnapshot:
         """Takes a snapshot."""
@@ -242,10 +243,7 @@ class Learner:
     def _decide(self, observation: Vector, explore: bool) -> Vector:
         if explore and self.driven_by is DrivenBy.RANDOM:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
-        return self._drawn(observation, explore)  # Alg. 1, l. 7
-
-    def _drawn(self, observation: Vector, explore: bool) -> Vector:
-        return self._agent.act(observation, explore)
+        return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
     def _make_agent(self, observation_size: int, action_size: int, seed: int) -> "Agent | Sb3Agent":
         sizes, config = (observation_size, action_size), self._config

@@ -1,5 +1,6 @@
 """Snapshot of a learner's policy that acts and explores without torch."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, Protocol
@@ -8,7 +9,7 @@ import numpy as np
 
 from risk_sac.search.agents.controls import Held
 from risk_sac.search.agents.transition import Transition
-from risk_sac.search.frozen_policy import LOG_STD_HALF, LOG_STD_MIDDLE, FrozenPolicy, respond
+from risk_sac.search.frozen_policy import LOG_STD_HALF, LOG_STD_MIDDLE, FrozenPolicy, Layers, respond
 from risk_sac.world.types import Floats, Vector
 
 Exploration = float | Literal["squashed", "clipped"]
@@ -16,14 +17,14 @@ Exploration = float | Literal["squashed", "clipped"]
 CLIPPED = -20.0, 2.0  # log σ of Stable-Baselines3's SAC
 
 
-class Reflection(Protocol):
-    """Mirror image of what is observed and done, see `risk_sac.search.prior.mirror`."""
+class Attacking(Protocol):
+    """An episode as a policy of one adversary sees it, see `risk_sac.search.prior.attacker`."""
 
-    def observation(self, seen: Vector) -> Vector:
-        """Returns what is observed in the mirrored scene."""
+    def seen(self, observation: Vector, value: Callable[[Vector], float], explore: bool) -> Vector:
+        """Returns the policy's input."""
 
-    def action(self, acted: Vector) -> Vector:
-        """Returns the mirrored action."""
+    def acted(self, action: Vector) -> Vector:
+        """Returns the joint action."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +37,7 @@ class PolicySnapshot:
       decision_steps: environment steps for which an action is held.
       random_steps: steps that are left of the warm-up, in which actions are uniformly random.
       dual_variable: λ.
-      mirror: of a policy that sees every other episode mirrored.
+      critic: of a policy of one adversary, which it chooses; none of a joint policy.
     """
 
     policy: FrozenPolicy
@@ -44,12 +45,13 @@ class PolicySnapshot:
     decision_steps: int
     random_steps: int
     dual_variable: float
-    mirror: Reflection | None = None
+    critic: Layers = ()
 
     def state(self) -> dict[str, Any]:
         """Returns plain values of what learning changes."""
         return {
             "layers": list(self.policy.layers),
+            "critic": list(self.critic),
             "random_steps": self.random_steps,
             "dual_variable": self.dual_variable,
         }
@@ -57,12 +59,13 @@ class PolicySnapshot:
     def at(self, state: dict[str, Any]) -> "PolicySnapshot":
         """Returns the same learner's policy at another moment, as `state` describes it."""
         policy = replace(self.policy, layers=tuple(state["layers"]))
-        return replace(self, policy=policy, random_steps=state["random_steps"], dual_variable=state["dual_variable"])
+        rest = {name: value for name, value in state.items() if name != "layers"}
+        return replace(self, policy=policy, **rest)
 
 
-def drawn_mirrored(random: np.random.Generator, mirror: Reflection | None) -> bool:
-    """Draws whether an episode is mirrored; never without a mirror."""
-    return mirror is not None and bool(random.integers(2))
+def own_value(policy: FrozenPolicy, critic: Layers, seen: Vector) -> float:
+    """Returns a critic's value of a policy's own action."""
+    return float(respond(critic, np.concatenate((seen, policy(seen))), normalised=True)[0])
 
 
 def explored(outputs: Vector, exploration: Exploration, random: np.random.Generator) -> Vector:
@@ -85,11 +88,16 @@ class SnapshotActor:
 
     can_stop_early = False
 
-    def __init__(self, snapshot: PolicySnapshot, seed: int) -> None:
-        """Begins an episode; the seed is of all that it draws."""
+    def __init__(
+        self,
+        snapshot: PolicySnapshot,
+        seed: int,
+        begin: Callable[[np.random.Generator], Attacking] | None = None,
+    ) -> None:
+        """Begins an episode; the seed is of all that it draws. `begin` is for a policy of one adversary."""
         self._snapshot, self._held = snapshot, Held(snapshot.decision_steps)
         self._random = np.random.default_rng(seed)
-        self._mirror = snapshot.mirror if drawn_mirrored(self._random, snapshot.mirror) else None
+        self._attack = begin and begin(self._random)
         self.transitions: list[Transition] = []
 
     @property
@@ -112,13 +120,16 @@ class SnapshotActor:
         """Learns nothing: the learner does, at `tell`."""
 
     def _decide(self, observation: Vector, explore: bool) -> Vector:
+        if self._attack is None:
+            return self._drawn(observation, explore)
+        value = partial(own_value, self._snapshot.policy, self._snapshot.critic)
+        return self._attack.acted(self._drawn(self._attack.seen(observation, value, explore), explore))
+
+    def _drawn(self, seen: Vector, explore: bool) -> Vector:
         policy, exploration = self._snapshot.policy, self._snapshot.exploration
         if explore and len(self.transitions) < self._snapshot.random_steps:
             return self._random.uniform(-1.0, 1.0, policy.action_size).astype(np.float32)
-        seen = observation if self._mirror is None else self._mirror.observation(observation)
         if explore:
-            outputs = respond(list(policy.layers), seen, normalised=policy.normalised)
-            action = explored(outputs, exploration, self._random)
-        else:
-            action = policy(seen)
-        return action if self._mirror is None else self._mirror.action(action)
+            outputs = respond(policy.layers, seen, normalised=policy.normalised)
+            return explored(outputs, exploration, self._random)
+        return policy(seen)

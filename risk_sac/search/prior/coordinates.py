@@ -65,8 +65,11 @@ class Coordinates(NamedTuple):
 
     @property
     def symmetric(self) -> bool:
-        """Whether the mirror image of a point is a point too."""
-        return two_sided(self.adversaries, self.space.names)
+        """Whether the mirror image of a point is a point too: names on the left have their like on the right."""
+        names, adversaries = self.space.names, self.adversaries
+        sides = [name for name in names if other_side(name) != name]
+        both = bool(sides) and all(other_side(name) in names for name in sides)
+        return both and set(OTHER_SIDE) <= set(adversaries) and len(set(adversaries)) == len(adversaries)
 
     def reflected(self, points: Floats) -> Floats:
         """Returns the mirror images of points, `n x dimension`; the coordinates are symmetric."""
@@ -104,13 +107,6 @@ def other_side(name: str) -> str:
     """Exchanges left and right at the beginning of a name."""
     side, _, rest = name.partition("_")
     return "_".join(filter(None, (OTHER_SIDE.get(side, side), rest)))
-
-
-def two_sided(adversaries: Sequence[str], parameters: Sequence[str]) -> bool:
-    """Tells whether names on the left have their like on the right, and vice versa."""
-    sides = [name for name in parameters if other_side(name) != name]
-    both = all(other_side(name) in parameters for name in sides)
-    return bool(sides) and both and set(OTHER_SIDE) <= set(adversaries) and len(set(adversaries)) == len(adversaries)
 
 
 def _unit(values: Floats, low: Floats, width: Floats) -> Floats:

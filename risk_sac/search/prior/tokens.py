@@ -21,8 +21,7 @@ from risk_sac.scenario.lane_places import lane_line, lanes_ahead
 from risk_sac.scenario.layout import LEAD_IN_S, BodyStart, Layout, PedestrianStart, StaticStart, VehicleStart
 from risk_sac.scenario.limits import Conditions, Limits, conditions, limits_from_odd
 from risk_sac.scenario.travel_line import TravelLine, line_of
-from risk_sac.search.agents.controls import PASSIVE
-from risk_sac.search.scripts import SAME_WAY_COS, SIZE, Genes
+from risk_sac.search.scripts import PASSIVE, SAME_WAY_COS, SIZE, Genes
 from risk_sac.world.net import Net, NetLane
 from risk_sac.world.types import Floats, Role
 
@@ -104,13 +103,13 @@ class Tokenizer:
         self._actors = len(problem.family.adversaries) + OTHERS
         self.genes = SIZE * len(problem.family.adversaries)  # of a point
         self._tokens = lru_cache(maxsize=SCENES)(self._of_key)
+        self._nothing = self._none()
 
     def batch(self, points: Floats) -> TokenBatch:
         """Returns the tokens of points in the unit cube: scenes, and the genes behind them; `b x d`."""
         size = self._problem.space.dimension
         of = [self._tokens(row.tobytes()) for row in np.ascontiguousarray(points[:, :size], dtype=np.float64)]
-        none = self._none()
-        scenes = [none if one is None else one for one in of]
+        scenes = [self._nothing if one is None else one for one in of]
         genes = points[:, size:].reshape(len(points), -1, SIZE)
         scripts = np.zeros((len(points), self._actors, 1 + SIZE), np.float32)
         active = genes[:, :, 0]
@@ -124,6 +123,10 @@ class Tokenizer:
             turns=np.stack([one.turns for one in scenes]),
             playable=np.array([one is not None for one in of]),
         )
+
+    def of_scene(self, unit_scene: Floats) -> SceneTokens:
+        """Returns the tokens of a scene in the unit cube; zeros if it cannot be laid out."""
+        return self._tokens(unit_scene.tobytes()) or self._nothing
 
     def _of_key(self, key: bytes) -> SceneTokens | None:
         """Returns the tokens of a scene; None if it cannot be laid out."""

@@ -8,6 +8,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import CheckpointError, ConfigError
 from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.prior.files import DATA, MOST_BYTES
+from risk_sac.search.prior.policy import POLICY
 from risk_sac.search.prior.sampler import Arm, PriorOptimizer, Yields
 from risk_sac.search.prior.script_model import PlacedModel
 from risk_sac.search.prior.shipped import (
@@ -42,8 +43,7 @@ def test_what_ships_is_a_model_and_a_library_for_each_family_of_the_paper():
     assert {path.name for path in DATA.glob("*.npz")} == {
         MODEL,
         *(f"{family}.npz" for family in PAPER_FAMILIES),
-        "low-policy.npz",
-        "mixed-policy.npz",
+        POLICY,
     }
     assert sum(path.stat().st_size for path in DATA.glob("*.npz")) <= MOST_BYTES
     for family in PAPER_FAMILIES:

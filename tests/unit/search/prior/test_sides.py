@@ -1,25 +1,19 @@
 """What strikes from one side strikes from the other side as often."""
 
-from collections import Counter
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from risk_sac.config import LearnerConfig, RunSpec, SceneOptimizerConfig, method_of
+from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.env.problem import Problem
 from risk_sac.records import Grade
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.prior.coordinates import Coordinates
-from risk_sac.search.prior.learner import PretrainedLearner
-from risk_sac.search.prior.mirror import Mirror
-from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.search.prior.start import start_of
 from risk_sac.search.scene_optimizer import ArchiveOptimizer
 from risk_sac.search.scripts import SIZE
 from risk_sac.search.searchers import Searchers
-from tests.builders import collision, judgement, pretrained_policy
+from tests.builders import collision, judgement
 
 HIT = collision(other_id="left", verdicts={"ego_moving": True}, judgement=judgement(Grade.PREVENTABLE))
 LOW = Coordinates.of(FAMILIES["low"])
@@ -85,33 +79,3 @@ def test_searches_of_low_get_the_mirror_and_others_do_not():
         sampler = Searchers(spec, Problem.from_spec(spec), 1, 1).next(learning=True).sampler
         assert isinstance(sampler, ArchiveOptimizer)
         assert (sampler.reflect is not None) == has_mirror
-
-
-def test_the_mirror_puts_static_bodies_on_the_other_side():
-    layout = replace(PolicyLayout.of(problem()), statics=2)
-    mirror = Mirror.of(layout)
-    assert mirror is not None
-    seen = np.zeros(layout.observation_size, np.float32)
-    seen[-5:] = 0.7, 0.2, 0.9, -0.1, 0.5  # two places ahead and aside, and the time left
-    np.testing.assert_array_equal(mirror.observation(seen)[-5:], np.float32([0.7, -0.2, 0.9, 0.1, 0.5]))
-
-
-def test_the_policy_acts_in_the_mirror_in_every_other_episode():
-    layout = PolicyLayout.of(problem())
-    mirror = Mirror.of(layout)
-    assert mirror is not None
-    pretrained = replace(pretrained_policy(layout), family="low")
-    learner = PretrainedLearner(pretrained, layout, method_of("risk-sac-pretrained"), LearnerConfig(), 5)
-    seen = np.random.default_rng(2).random(layout.observation_size).astype(np.float32)
-
-    def actions(observation: np.ndarray) -> Counter[tuple[float, ...]]:
-        acted: Counter[tuple[float, ...]] = Counter()
-        for _ in range(40):
-            learner.begin(np.empty(0))
-            acted[tuple(learner.act(observation, explore=False).tolist())] += 1
-        return acted
-
-    own, other = actions(seen), actions(mirror.observation(seen))
-    assert len(own) == len(other) == 2
-    assert all(10 <= times <= 30 for times in own.values())
-    assert {tuple(mirror.action(np.array(action)).tolist()) for action in own} == set(other)
