@@ -56,18 +56,8 @@ GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 DISCOUNT, PRIOR_STEPS = 0.995, 1000.0
 
 
-class Terms(NamedTuple):
-    """On which guide and policy take turns."""
-
-    policy_step: float  # processor time of a policy's step and its updates, as a multiple of the guide's
-    prior_worth: float  # of PRIOR_STEPS that either is credited with at first
-    least: float  # share of the processor time for either
-
-
-COLD = Terms(3.0, 0.05, 0.01)  # more would be lost on a policy that yields nothing
-# Choice: between 1.5 with a planner under test and 6 with SUMO's driver. Both are credited with much: neither is to be
-# given up for the first find of the other.
-PRETRAINED = Terms(2.0, 10.0, 0.1)
+POLICY_STEP = 3.0  # processor time of a policy's step and its updates, as a multiple of the guide's
+PRIOR_WORTH, LEAST = 0.05, 0.01  # more would be lost on a policy that yields nothing
 
 
 class Searcher(NamedTuple):
@@ -105,8 +95,7 @@ class Searchers:
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         guided = method.takes_turns or (method.learns and pretrained is None)
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if guided else None
-        terms = COLD if pretrained is None else PRETRAINED
-        self._turns = Turns(spec.stream, terms) if method.takes_turns else None
+        self._turns = Turns(spec.stream) if method.takes_turns else None
         self._next = self._own
         self._episodes, self._failures = 0, 0  # of the search
 
@@ -131,8 +120,6 @@ class Searchers:
         Args:
           out: number of episodes that are being played.
         """
-        if isinstance(self.agent, PretrainedLearner):
-            return True  # it needs none
         warm_start = self._spec.learner.warm_start
         spent = self._episodes + out >= warm_start.episodes and not (self._turns and warm_start.episodes)
         return spent or self._failures >= warm_start.failures
@@ -295,14 +282,14 @@ class Turns:
     to the same turns.
     """
 
-    def __init__(self, seed: int, terms: Terms) -> None:
+    def __init__(self, seed: int) -> None:
         self._random = np.random.default_rng(seed)
         self._bandit = DiscountedBandit(
             discount=DISCOUNT,
-            prior_worth=terms.prior_worth,
+            prior_worth=PRIOR_WORTH,
             prior_cost=PRIOR_STEPS,
-            least=terms.least,
-            unit_costs=(1.0, terms.policy_step),
+            least=LEAST,
+            unit_costs=(1.0, POLICY_STEP),
         )
         self._finds = Finds()
 

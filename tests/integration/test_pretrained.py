@@ -6,7 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.config import AgentConfig, Budget, EgoConfig, LearnerConfig, Requirement, RunMethod, RunSpec
+from risk_sac.config import (
+    AgentConfig,
+    Budget,
+    EgoConfig,
+    LearnerConfig,
+    Requirement,
+    RunMethod,
+    RunSpec,
+    WarmStartConfig,
+)
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
@@ -15,7 +24,7 @@ from risk_sac.failures.bundle import read_bundle, write_bundle
 from risk_sac.failures.regress import regress
 from risk_sac.failures.studied import Verdict
 from risk_sac.failures.study import bundles
-from risk_sac.records import DrivenBy, EpisodeRecord
+from risk_sac.records import DrivenBy, EpisodeRecord, Outcome
 from risk_sac.run_folder.results import EPISODES, records_from_lines
 from risk_sac.search import searchers
 from risk_sac.search.agents.controls import ScriptFollower
@@ -24,7 +33,7 @@ from risk_sac.search.prior.attacker import Attack, AttackerView
 from risk_sac.search.prior.learner import PretrainedLearner
 from risk_sac.search.searchers import Searchers
 from risk_sac.world.types import Scene, Vector
-from tests.builders import pretrained_policy
+from tests.builders import episode_record, pretrained_policy
 from tests.listener import Listener
 
 
@@ -85,8 +94,11 @@ def test_one_adversary_attacks_and_the_attackers_differ() -> None:
 
 def test_the_diverse_search_shares_its_episodes_between_scripts_and_policy() -> None:
     subject = searchers_of(spec("risk-sac-diverse", family="cyclist_ahead"))
-    drivers = {type(subject.next(learning=True).actor) for _ in range(200)}
-    assert drivers == {ScriptFollower, PretrainedLearner}
+    first = {type(subject.next(learning=True).actor) for _ in range(200)}
+    for index in range(WarmStartConfig().failures):
+        subject.add(episode_record(index, Outcome.FAILURE))
+    later = {type(subject.next(learning=True).actor) for _ in range(1000)}
+    assert (first, later) == ({ScriptFollower}, {ScriptFollower, PretrainedLearner})
 
 
 def test_without_a_prior_the_method_is_refused() -> None:

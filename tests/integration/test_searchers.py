@@ -14,8 +14,9 @@ from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.agents.learner import Learner
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.loop import execute_run
+from risk_sac.search.prior.learner import PretrainedLearner
 from risk_sac.search.scene_optimizer import ArchiveOptimizer
-from risk_sac.search.searchers import COLD, GUIDE, OWN, Searchers, Turns
+from risk_sac.search.searchers import GUIDE, OWN, Searchers, Turns
 from tests.builders import collision, episode_record, judgement
 from tests.listener import Listener
 
@@ -73,12 +74,11 @@ def test_a_guide_has_done_its_part_after_so_many_episodes_or_failures() -> None:
 
 
 def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> None:
-    """At a family whose policy begins from nothing."""
     few = WarmStartConfig(episodes=3, failures=2)
     assert makers(searchers("risk-sac-diverse", few, "dense"), [Outcome.SAFE] * 20) == [ScriptFollower] * 21
     taken = makers(searchers("risk-sac-diverse", few, "dense"), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
     assert taken[:2] == [ScriptFollower] * 2
-    assert set(taken[2:]) == {ScriptFollower, Learner}
+    assert set(taken[2:]) == {ScriptFollower, PretrainedLearner}
 
 
 def test_a_guide_has_done_its_part_once_its_last_episode_is_out() -> None:
@@ -98,7 +98,7 @@ def test_an_episode_of_the_guide_says_nothing_about_the_arm_of_the_policys_scene
 
 def shares(*findings: tuple[int, str, Grade]) -> list[float]:
     """Share of the policy's turns among 2,000, after each finding."""
-    turns, found = Turns(0, COLD), []
+    turns, found = Turns(0), []
     for arm, kind, grade in findings:
         turns.tell(arm, 100, [collision(judgement=judgement(grade, kind=kind))])
         found.append(sum(turns.draw() for _ in range(2000)) / 2000)
@@ -149,12 +149,13 @@ def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_g
         drove.setdefault(type(searcher.actor), set()).add(subject.driven_by(learning=True))
         subject.tell(point, 0.0, Encounter(collision=struck))
         subject.add(episode_record(index, Outcome.FAILURE, collision=struck))
-    assert drove == {ScriptFollower: {DrivenBy.MODEL, DrivenBy.RANDOM, DrivenBy.SCRIPT}, Learner: {DrivenBy.POLICY}}
+    assert drove.pop(ScriptFollower) == {DrivenBy.MODEL, DrivenBy.RANDOM, DrivenBy.SCRIPT}
+    assert drove == {PretrainedLearner: {DrivenBy.POLICY}}
 
 
 def test_the_frozen_policy_is_on_its_own() -> None:
     subject = searchers("risk-sac-diverse", WarmStartConfig(), "dense")
-    assert type(subject.next(learning=False).actor) is Learner
+    assert type(subject.next(learning=False).actor) is PretrainedLearner
 
 
 def test_a_search_ends_when_its_processor_time_is_spent_and_is_then_evaluated(tmp_path: Path) -> None:
