@@ -25,6 +25,8 @@ FREE_SCENES = 0.5  # of its episodes, those whose scene it chooses too
 SCENES = 32  # among which it chooses then
 RANDOM_SCRIPTS = 0.25  # of the scripts among which it chooses
 DISCOUNT, PRIOR_EPISODES, LEAST = 0.97, 5.0, 0.08
+EARLIER_SHARE = 0.5  # of the draws from the library, from what an earlier run found
+UNSEEN_TRUST = 0.5  # share of the model's credit where there is no library
 UNTRIED = 0.5, 1.0, 1.0  # worth per episode that arms are credited with at first
 
 
@@ -84,7 +86,8 @@ class PriorOptimizer(ArchiveOptimizer):
         self._library, self._library_kinds, self._earlier = start.library, start.library_kinds, start.earlier
         self._library_worth, self._belief = start.library_worth, start.belief
         arms = {Arm.ARCHIVE: True, Arm.LIBRARY: len(self._library) > 0, Arm.MODEL: self.learned}
-        self._yields = Yields(tuple(arm for arm, there in arms.items() if there), start.trust)
+        trust = float(start.library_worth.mean()) if len(self._library) else UNSEEN_TRUST
+        self._yields = Yields(tuple(arm for arm, there in arms.items() if there), trust)
         self._arm = Arm.ARCHIVE
         self._played: list[int] = []  # rows of the library
         self._finds = Finds()
@@ -114,10 +117,15 @@ class PriorOptimizer(ArchiveOptimizer):
         """Draws a row that was not played yet.
 
         A row is the more likely the rarer its variant is so far. After the last row all can be drawn again.
+
+        Some of the draws are from what an earlier run found, while some of that was not played.
         """
         if len(self._played) == len(self._library):
             self._played.clear()
         rows = np.setdiff1d(np.arange(len(self._library)), self._played)
+        earlier = rows[rows < self._earlier]
+        if len(earlier) and self._random.random() < EARLIER_SHARE:
+            rows = earlier
         novelty = np.array([_novelty(self._finds.variants[self._library_kinds[row]]) for row in rows])
         weights = novelty * self._library_worth[rows]
         row = int(self._random.choice(rows, p=weights / weights.sum()))
@@ -135,11 +143,7 @@ class PriorOptimizer(ArchiveOptimizer):
         prediction = self._model.predict(points, self._belief)
         worth = NEW_VARIANT * (prediction.fails + CANDIDATE * prediction.candidate)
         novelty = np.array([_novelty(self._finds.variants[kind]) for kind in self._model.kinds])
-        if self._earlier is None:
-            share = prediction.kinds @ novelty
-        else:
-            share = (prediction.kinds * self._earlier.newness(self._model, points)) @ novelty
-        best: Floats = points[int((worth * share).argmax())]
+        best: Floats = points[int((worth * (prediction.kinds @ novelty)).argmax())]
         return best
 
     def _scripts(self, count: int, size: int) -> Floats:

@@ -16,36 +16,22 @@ if TYPE_CHECKING:
     from risk_sac.search.prior.script_model import PlacedModel
 
 DOUBT = 0.5  # share of the uniform belief beside an earlier run's, whose ego may have been another
-UNSEEN_TRUST = 0.5  # where there is no library
-LEAST_NEW = 0.02  # that a point may fail anew, however sure the model is that the earlier ego fails there
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EarlierEgo:
-    """What an earlier run has learnt about its ego."""
-
-    belief: Floats  # E
-    kinds: frozenset[str]  # names of the variants that it found
-
-    def newness(self, model: "PlacedModel", points: Floats) -> Floats:
-        """Predicts by `n x K` how likely a failure of each kind is one that this ego does not have, up to 1."""
-        fails = model.predict(points, self.belief).fails
-        known = np.array([kind in self.kinds for kind in model.kinds])
-        share: Floats = np.clip(1.0 - np.outer(fails, known), LEAST_NEW, 1.0)
-        return share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PriorStart:
-    """A search's prior; points are the problem's own."""
+    """A search's prior; points are the problem's own.
+
+    Attributes:
+      earlier: rows of the library, the first ones, that an earlier run has found.
+    """
 
     model: "PlacedModel"
     library: Floats  # n x d; without rows where the scenario is like no family of the paper
     library_kinds: tuple[str, ...]  # n, names of variants
     library_worth: Floats  # n; less than 1 where a row fails less often here than where it was found
     belief: Floats  # E
-    trust: float  # share of their usual credit that model and library begin with
-    earlier: EarlierEgo | None = None
+    earlier: int = 0
 
 
 def start_of(problem: Problem, prior: str) -> PriorStart:
@@ -77,10 +63,9 @@ def _shipped(problem: Problem) -> PriorStart:
     own, like = Coordinates.of(problem), problem.family.like
     model = PlacedModel(shipped_model(), Tokenizer(problem))
     unknown, none = model.unknown(), np.empty((0, own.dimension))
+    start = PriorStart(model=model, library=none, library_kinds=(), library_worth=np.empty(0), belief=unknown)
     if like is None:
-        return PriorStart(
-            model=model, library=none, library_kinds=(), library_worth=none[:, 0], belief=unknown, trust=UNSEEN_TRUST
-        )
+        return start
     library, there = shipped_library(like.family), Coordinates.of(FAMILIES[like.family])
     known, kinds, fails = library.points, library.kinds, library.fails
     if there.symmetric and own.symmetric:  # most of its rows strike from the left
@@ -88,36 +73,24 @@ def _shipped(problem: Problem) -> PriorStart:
     points, worth = own.placed(there.scripted(known)), np.ones(len(known))
     if own.space != there.space or own.adversaries != there.adversaries:
         worth = np.minimum(model.predict(points, unknown).fails / fails, 1.0).astype(np.float64)
-    trust = float(worth.mean())
-    return PriorStart(
-        model=model, library=points, library_kinds=kinds, library_worth=worth, belief=unknown, trust=trust
-    )
+    return replace(start, library=points, library_kinds=kinds, library_worth=worth)
 
 
 def _after(start: PriorStart, own: Coordinates, earlier: tuple[FamilyScripts, ...]) -> PriorStart:
-    """Puts what earlier runs found before the shipped library, and believes in what their egos did.
-
-    What these egos fail at is known, so its rows are worth little.
-    """
+    """Puts what earlier runs found before the shipped library, and believes in what their egos did."""
     failures = np.concatenate([np.empty((0, own.dimension)), *(_points(own, each, each.failures) for each in earlier)])
     kinds = tuple(script.kind for each in earlier for script in each.failures)
     belief = start.belief
     for each in earlier:
         failed = np.array([bool(script.kind) for script in each.latest])
         belief = start.model.believe(belief, _points(own, each, each.latest), failed)
-    before = EarlierEgo(belief=belief, kinds=frozenset(kinds))
-    worth = start.library_worth.copy()
-    again = np.array([kind in before.kinds for kind in start.library_kinds], np.bool_)
-    if again.any():
-        fails = start.model.predict(start.library[again], belief).fails
-        worth[again] *= np.clip(1.0 - fails, LEAST_NEW, 1.0)
     return replace(
         start,
         library=np.concatenate([failures, start.library]),
         library_kinds=(*kinds, *start.library_kinds),
-        library_worth=np.concatenate([np.full(len(kinds), LEAST_NEW), worth]),
+        library_worth=np.concatenate([np.ones(len(kinds)), start.library_worth]),
         belief=(1.0 - DOUBT) * belief + DOUBT * start.model.unknown(),
-        earlier=before,
+        earlier=len(kinds),
     )
 
 

@@ -14,7 +14,7 @@ from risk_sac.run_folder.results import EPISODES
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import shipped_document
 from risk_sac.search.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
-from risk_sac.search.prior.sampler import ReplayOptimizer
+from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.search.prior.shipped import inputs_of, shipped_library
 from risk_sac.search.prior.start import start_of
 from tests.earlier_runs import FAILURES, SAFE, run_folder
@@ -25,22 +25,18 @@ def own_library(tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path / "library"))
 
 
-def test_what_an_earlier_run_found_is_kept_but_counts_as_known(tmp_path):
+def test_what_an_earlier_run_found_comes_first_and_its_ego_is_believed_in(tmp_path):
     prior = pinned_prior(str(run_folder(tmp_path / "v1")), ["low"])
     problem = Problem.from_spec(RunSpec(family="low", method="risk-sac-diverse", seed=0))
-    shipped, start = shipped_library("low"), start_of(problem, prior)
-    assert len(start.library) == FAILURES + 2 * len(shipped.points)
-    np.testing.assert_allclose(start.library[:FAILURES], shipped.points[:FAILURES], atol=1e-12)
+    shipped, start = shipped_library("low").points, start_of(problem, prior)
+    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES + 2 * len(shipped))
+    np.testing.assert_allclose(start.library[:FAILURES], shipped[:FAILURES], atol=1e-12)
     assert start.belief.sum() == pytest.approx(1.0)
     assert start.belief.max() > 1.1 / len(start.belief)
-    assert start.library_worth[:FAILURES].max() < 0.1
-    kind = start.model.kinds[0]
-    known = replace(start.earlier, kinds=frozenset({kind}))
-    newness = known.newness(start.model, start.library)
-    expected = 1.0 - start.model.predict(start.library, known.belief).fails
-    np.testing.assert_allclose(newness[:, 0], expected.clip(0.02), rtol=1e-5)
-    np.testing.assert_array_equal(newness[:, 1:], 1.0)
-    assert expected.min() < 0.5
+    subject = PriorOptimizer(inputs_of("low"), SceneOptimizerConfig(), 1, start)
+    for _ in range(40):
+        subject.tell(subject.ask(), 0.0)
+    assert {0, 1} <= set(subject.state()["played"])
 
 
 def test_the_copy_outlives_its_source_and_has_the_digest_of_its_content(tmp_path):
@@ -99,7 +95,7 @@ def test_a_scenario_without_like_goes_on_from_its_own_scripts_alone(tmp_path):
         pinned_prior(str(run_folder(tmp_path / "low")), [name])
     prior = pinned_prior(str(run_folder(tmp_path / "own", name)), [name])
     start = start_of(Problem.from_spec(RunSpec(family=name, method="risk-sac-diverse", seed=0)), prior)
-    assert len(start.library) == FAILURES
+    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES)
     subject = ReplayOptimizer(inputs_of("low"), SceneOptimizerConfig(), 1, start)
     for _ in range(40):
         subject.tell(subject.ask(), 0.0)
