@@ -3,14 +3,12 @@
     python -m risk_sac.lab.figures.regression_prior OUT [--jobs N]
 
 Version 1 is `idm-aeb` with one fault, version 2 is `idm-aeb` with another. Each version 1 is searched for 5,000 steps;
-then each version 2 until its fault is detected. The same command goes on with an interrupted one; OUT/runs.csv has the
-result.
+then each version 2 until its fault is detected. The same command goes on with an interrupted one. OUT/SEED.csv has the
+runs of a seed so far.
 """
 
 import argparse
-import csv
 import multiprocessing
-from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from functools import partial
 from pathlib import Path
@@ -20,19 +18,21 @@ from risk_sac.config import Budget, FamilyName, RunSpec
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.recorder import Recorder
 from risk_sac.lab.benchmark.runs import Detection, ego_with, first_detection
+from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.search.loop import execute_run
 from risk_sac.search.prior.earlier import pinned_prior
 
-# Family, faults of versions 1 and 2; np.random.default_rng(44) drew them from the catalogue's training part.
+# Family, faults of versions 1 and 2. Version 2 has the faults of mixed and dense, of the catalogue's test set, that
+# `risk-sac-diverse` detects in at least 4 of 5 runs of `report/measured/detections.csv`; of two alike only the first.
 PAIRS: tuple[tuple[FamilyName, str, str], ...] = (
-    ("low", "short-horizon", "blind-right"),
-    ("low", "short-horizon", "late-braking"),
-    ("mixed", "blind-right", "trucks-as-cars"),
-    ("dense", "crossing-yields", "tailgates"),
+    ("mixed", "blind-right", "pedestrian-range"),
+    ("mixed", "blind-right", "kerb-waits"),
+    ("mixed", "blind-right", "hidden-then-slow"),
+    ("dense", "crossing-yields", "turning-pedestrian"),
 )
-SEEDS = (1, 2, 3)
+SEEDS = (1302, 1303, 1304)
 CAMPAIGN_STEPS, MOST_STEPS, EPISODES = 5_000, 5_000, 2_000
 ARMS = ("campaign", "shipped", "none")
 Case = tuple[FamilyName, str, str, int, str]
@@ -80,53 +80,43 @@ def detection(out: Path, case: Case) -> Detection:
     return first_detection(spec_of(family, after, seed, prior), folder, MOST_STEPS)
 
 
-def rows(cases: Sequence[Case], detections: Sequence[Detection]) -> Iterator[dict[str, object]]:
-    """Yields a row for each case."""
-    for (family, before, after, seed, arm), case_detection in zip(cases, detections, strict=True):
-        yield {
-            "family": family,
-            "version_1": before,
-            "version_2": after,
-            "seed": seed,
-            "prior": arm,
-            "detected": case_detection.detected,
-            "triggered": case_detection.triggered,
-            "steps": case_detection.steps,
-            "driven_by": case_detection.episode.driven_by if case_detection.episode else None,
-            "kind": case_detection.kind,
-        }
+def row(out: Path, case: Case) -> Row:
+    """Returns the outcome of a search of a version 2."""
+    family, before, after, seed, arm = case
+    found = detection(out, case)
+    return {
+        "family": family,
+        "version_1": before,
+        "version_2": after,
+        "seed": seed,
+        "prior": arm,
+        "detected": found.detected,
+        "triggered": found.triggered,
+        "steps": found.steps,
+        "refuted": found.refuted,
+        "driven_by": found.episode.driven_by if found.episode else None,
+        "kind": found.kind,
+    }
 
 
 def main() -> None:
-    """Plays what is lacking and writes the table."""
+    """Plays what is lacking, a seed at a time, and writes the tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
-    cases: list[Case] = [(*pair, seed, arm) for seed in SEEDS for pair in PAIRS for arm in ARMS]
-    firsts = dict.fromkeys((case[0], case[1], case[3]) for case in cases)  # two pairs may share one
-    with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        campaigns = [pool.submit(campaign, options.out, *first) for first in firsts]
-        others = [pool.submit(detection, options.out, case) for case in cases if case[-1] != "campaign"]
-        wait(campaigns)
-        wait(others)
-        found = list(pool.map(partial(detection, options.out), cases))
-    write(options.out / "runs.csv", cases, found)
-
-
-def write(file: Path, cases: Sequence[Case], detections: Sequence[Detection]) -> None:
-    """Writes the runs, and prints their summary."""
-    told = list(rows(cases, detections))
-    with file.open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, told[0])
-        writer.writeheader()
-        writer.writerows(told)
-    for arm in ARMS:
-        times = [each.detected or MOST_STEPS for case, each in zip(cases, detections, strict=True) if case[-1] == arm]
-        detected = sum(
-            each.detected is not None for case, each in zip(cases, detections, strict=True) if case[-1] == arm
-        )
-        print(f"prior {arm}: detected {detected} of {len(times)}, restricted mean {mean(times):.0f} steps", flush=True)
+    rows: list[Row] = []
+    for seed in SEEDS:
+        firsts = dict.fromkeys((family, before, seed) for family, before, _ in PAIRS)  # two pairs may share one
+        with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
+            wait([pool.submit(campaign, options.out, *first) for first in firsts])
+        cases: list[Case] = [(*pair, seed, arm) for pair in PAIRS for arm in ARMS]
+        rows += rows_of(partial(row, options.out), cases, options.jobs, options.out / f"{seed}.csv")
+        for arm in ARMS:
+            times = [each["detected"] for each in rows if each["prior"] == arm]
+            restricted = mean(MOST_STEPS if time is None else time for time in times)
+            detected = len(times) - times.count(None)
+            print(f"prior {arm}: detected {detected} of {len(times)}, restricted mean {restricted:.0f} steps")
 
 
 if __name__ == "__main__":

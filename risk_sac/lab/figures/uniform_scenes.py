@@ -4,13 +4,14 @@
         [--scenes N] [--scripts N]
 
 plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
-learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library.
-So its failures are the ceiling of what scripts can reach there. A scenario without a library has random scripts alone.
+learnt. `any` plays up to N scripts in a scene until one leads to a plausible failure, half of them random and half
+mutated from the library. So its failures are the ceiling of what scripts can reach there. A scenario without a library
+has random scripts alone. `low` and `high` are Wilson's 95 % interval of the share of plausible failures.
 """
 
 import argparse
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -23,15 +24,18 @@ from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
-from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
+from risk_sac.lab.pretraining.episodes import play
+from risk_sac.metrics import wilson_interval
+from risk_sac.records import Collision, Violation
 from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.prior.start import PriorStart, start_of
 from risk_sac.search.scene_optimizer.archive import mutated
+from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Floats
 
 DRIVERS = ("model", "random", "any")
-SEED = 5
+SEED = 1302
 CHOICE = 1024  # scripts among which the model chooses
 
 
@@ -59,15 +63,23 @@ def chosen(random: np.random.Generator, start: PriorStart, scene: Floats, genes:
     return best
 
 
-def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
-    """Yields an episode per scene: the first that fails, or else the last; unplayable scenes are drawn again."""
+def outcomes(cell: Matchup, scenes: int, scripts: int) -> Iterator[Collision | Violation | None]:
+    """Yields a scene's valid violation; unplayable scenes are drawn again.
+
+    Of several scripts the first with a plausible violation counts, or else the last with any. An episode in which the
+    ego fails to answer has none.
+    """
     spec = RunSpec(family=cell.family, method="archive", seed=SEED, ego=ego_of(cell.ego))
     drawn, random = np.random.default_rng(SEED), np.random.default_rng((SEED, 1))
     with closing(RiskSacEnv.of(spec)) as env:
         space, horizon = env.problem.space, env.problem.family.horizon_steps
         follower, start = ScriptFollower(env.problem.family), start_of(env.problem, "shipped")
         while scenes:
-            scene, seed, episode = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
+            scene, seed, violation = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
+            try:
+                env.reset(seed=seed, options={"scene": space.from_unit(scene)})
+            except InfeasibleScene:
+                continue
             for _ in range(scripts if cell.driver == "any" else 1):
                 if cell.driver == "model":
                     genes = chosen(random, start, scene, follower.genes)
@@ -75,29 +87,28 @@ def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
                     genes = random.random(follower.genes)
                 else:
                     genes = script(random, start, follower.genes)
-                try:
-                    encounter, steps = play(env, follower, space.from_unit(scene), genes, seed, horizon)
-                except (InfeasibleScene, EgoFailed):
+                with suppress(EgoFailed):
+                    violation = play(env, follower, space.from_unit(scene), genes, seed, horizon)[0].worst or violation
+                if violation is not None and violation.plausible:
                     break
-                episode = outcome_of(encounter, np.concatenate([scene, genes]), cell.ego, steps)
-                if episode.kind:
-                    break
-            if episode is not None:
-                scenes -= 1
-                yield episode
+            scenes -= 1
+            yield violation
 
 
 def row(scenes: int, scripts: int, cell: Matchup) -> Row:
     """Returns the figures of a driver before an ego."""
-    episodes = list(found(cell, scenes, scripts))
-    failed = [each for each in episodes if each.kind]
+    failed = [violation for violation in outcomes(cell, scenes, scripts) if violation is not None]
+    plausible = [violation for violation in failed if violation.plausible]
+    low, high = wilson_interval(len(plausible), scenes)
     return cell._asdict() | {
-        "scenes": len(episodes),
+        "scenes": scenes,
+        "scripts": scripts if cell.driver == "any" else 1,
         "failures": len(failed),
-        "distinct": len({each.kind for each in failed}),
-        "candidates": sum(each.candidate for each in failed),
-        "candidates_distinct": len({each.kind for each in failed if each.candidate}),
-        "steps": sum(each.steps for each in episodes),  # of the episodes that are counted
+        "plausible": len(plausible),
+        "low": round(low, 3),
+        "high": round(high, 3),
+        "kinds": len({variant_name(violation) for violation in plausible}),
+        "candidates": sum(violation.headline_candidate for violation in plausible),
     }
 
 
