@@ -54,8 +54,6 @@ Actor = Learner | Control
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 # Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
 DISCOUNT, PRIOR_STEPS = 0.995, 1000.0
-
-
 POLICY_STEP = 3.0  # processor time of a policy's step and its updates, as a multiple of the guide's
 PRIOR_WORTH, LEAST = 0.05, 0.01  # more would be lost on a policy that yields nothing
 
