@@ -86,6 +86,6 @@ def respond(layers: Layers, inputs: Vector, *, normalised: bool = False) -> Vect
     return np.asarray(activation @ weights[-1] + biases[-1])
 
 
-def network(stacked: Layers, place: int = 0) -> Layers:
-    """Returns one network of `count x in x out` weights and `count x 1 x out` biases."""
-    return [layer[place].reshape(layer.shape[1:] if k % 2 == 0 else -1) for k, layer in enumerate(stacked)]
+def network(stacked: Layers) -> Layers:
+    """Returns the first network of `count x in x out` weights and `count x 1 x out` biases."""
+    return [layer[0].reshape(layer.shape[1:] if k % 2 == 0 else -1) for k, layer in enumerate(stacked)]

@@ -193,9 +193,9 @@ class PolicyTraining:
         stage = self._stage(self._round)
         warm = stage is not self._stages[0] or self._decisions >= stage.decisions
         demonstrated, policy = DEMONSTRATED if warm else TURNS, self._networks()
+        paper = [name for name in self._families if name in PAPER_FAMILIES]
         for stream in range(TURNS):
             random = np.random.default_rng((self.seed, self._round, stream))
-            paper = [name for name in self._families if name in PAPER_FAMILIES]
             among = paper if paper and random.random() < PAPER_SHARE else self._families
             family = among[random.integers(len(among))]
             driver: Driver = policy

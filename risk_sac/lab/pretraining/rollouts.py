@@ -108,7 +108,8 @@ class Player:
             point = turn.driver.points[int(random.integers(len(turn.driver.points)))]
             unit, act = point[:size], _script(problem.family, point[size:], random)
         else:
-            held, decide = Held(DECISION_STEPS), partial(_decided, turn, env.action_size, attack, random)
+            held = Held(DECISION_STEPS)
+            decide = partial(_decided, turn.driver, env.action_size, attack, random, turn.exploring)
             unit = random.random(size)
 
             def act(observation: Vector) -> Vector:
@@ -155,13 +156,20 @@ def _script(family: Family, genes: Floats, random: np.random.Generator) -> Calla
     return follower.act
 
 
-def _decided(turn: Turn, size: int, attack: Attack, random: np.random.Generator, observation: Vector) -> Vector:
-    """Draws a joint action."""
-    if turn.driver is None or isinstance(turn.driver, Demonstrations):
+def _decided(
+    networks: tuple[Layers, Layers] | None,
+    size: int,
+    attack: Attack,
+    random: np.random.Generator,
+    exploring: bool,
+    observation: Vector,
+) -> Vector:
+    """Draws a joint action; without networks a uniform one."""
+    if networks is None:
         return random.uniform(-1.0, 1.0, size).astype(np.float32)
-    layers, critic = turn.driver
+    layers, critic = networks
     value = partial(own_value, FrozenPolicy(tuple(layers), ACTION_SIZE, normalised=True), critic)
-    seen = attack.seen(observation, value, turn.exploring)
+    seen = attack.seen(observation, value, exploring)
     return attack.acted(explored(respond(layers, seen, normalised=True), "squashed", random))
 
 

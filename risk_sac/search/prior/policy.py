@@ -89,10 +89,6 @@ def starts_pretrained(spec: RunSpec, problem: Problem) -> bool:
 
 
 def check_prior(name: RunMethod, prior: str) -> None:
-    """Refuses a method that starts from a prior, where none is wanted.
-
-    Raises:
-      ConfigError: so it is.
-    """
+    """Refuses a method that starts from a prior without one; raises `ConfigError`."""
     if method_of(name).prior in ("library", "policy") and prior == "none":
         raise ConfigError("prior", f"none, and the method {name}", "one", "choose archive or risk-sac instead")
