@@ -67,7 +67,7 @@ CHUNK, TURN = 250, 10  # episodes: of a chunk, and in a row before one ego, sinc
 UNIFORM_SCENES, SCENE_DEVIATION = 0.6, 0.08
 RANDOM_SCRIPTS, UNCHANGED, FAITHFUL = 0.3, 0.3, 0.5  # of the bred ones: not mutated; put before their own scene
 SOUND_SHARE = 0.5  # of the draws, egos without a defect
-CANDIDATES = 0.7  # of the parents, those that led to a candidate for the headline
+CANDIDATES = 0.7  # of the parents, those that led to a candidate for the headline; without one a point is random
 
 
 def play_stream(family: str, seed: int, stream: int, folder: Path, chunks: int) -> None:
@@ -101,14 +101,11 @@ class Parents:
             kinds = self.candidates if episode.candidate else self.others
             kinds.setdefault(episode.kind, []).append(episode.point)
 
-    def __bool__(self) -> bool:
-        """Whether there is one."""
-        return bool(self.candidates or self.others)
-
-    def draw(self, random: np.random.Generator) -> Floats:
-        """Draws a kind, and then one of its points."""
+    def draw(self, random: np.random.Generator) -> Floats | None:
+        """Draws a kind, and then one of its points; None where there are none of the drawn sort."""
         kinds = self.candidates if random.random() < CANDIDATES else self.others
-        kinds = kinds or self.candidates or self.others
+        if not kinds:
+            return None
         points = kinds[sorted(kinds)[random.integers(len(kinds))]]
         return points[random.integers(len(points))]
 
@@ -160,15 +157,15 @@ class EpisodeStream:
         return rounded
 
     def _drawn(self, random: np.random.Generator) -> Floats:
-        size = self._space.dimension
-        if not self._parents:
+        size, parent = self._space.dimension, self._parents.draw(random)
+        if parent is None:
             return random.random(size + self._follower.genes)
-        parent = self._parents.draw(random)
         scene, genes = random.random(size), random.random(self._follower.genes)
         if random.random() >= UNIFORM_SCENES:
             scene = np.clip(parent[:size] + random.normal(0.0, SCENE_DEVIATION, size), 0.0, 1.0)
         if random.random() >= RANDOM_SCRIPTS:
-            own, other = parent, self._parents.draw(random)
+            other = self._parents.draw(random)
+            own, other = (parent, parent) if other is None else (parent, other)
             if random.random() >= FAITHFUL:
                 own, other = other, own
             genes = own[size:] if random.random() < UNCHANGED else mutated(own[size:], other[size:], random)
