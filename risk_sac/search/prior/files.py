@@ -1,9 +1,11 @@
 """Reads and writes the files in prior/weights: plain arrays with a description; nothing is unpickled."""
 
+import hashlib
 import io
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,15 @@ from risk_sac.errors import ConfigError
 MOST_BYTES = 3_000_000  # of a file
 DATA = Path(str(files("risk_sac.search.prior"))) / "weights"
 Arrays = Mapping[str, NDArray[Any]]
+
+
+@cache
+def weights_digest() -> str:
+    """Returns the first 12 digits of the SHA-256 of all shipped files, by name."""
+    digest = hashlib.sha256()
+    for path in sorted(DATA.glob("*.npz")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def write_arrays(path: Path, meta: Mapping[str, object], arrays: Arrays) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import DrivenBy
 from risk_sac.search.encounter import Encounter
+from risk_sac.search.prior.files import weights_digest
 from risk_sac.search.prior.start import PriorStart
 from risk_sac.search.scene_optimizer import ArchiveOptimizer
 from risk_sac.search.scene_optimizer.archive import DEVIATIONS, SHARES
@@ -76,7 +77,7 @@ class Yields:
 class PriorOptimizer(ArchiveOptimizer):
     """Archive search that the prior proposes points to."""
 
-    kind = "prior-of-actors"  # in states; those of "prior" had a model for each family
+    kind = "prior"
     initial = 0
     learned = True
 
@@ -168,6 +169,9 @@ class PriorOptimizer(ArchiveOptimizer):
         if self.learned:
             failed = np.array([bool(encounter.valid_violations)])
             self._belief = self._model.believe(self._belief, point[None], failed)
+
+    def _identity(self) -> State:
+        return super()._identity() | {"weights": weights_digest()}
 
     def state(self) -> State:
         """See `SceneOptimizer.state`."""

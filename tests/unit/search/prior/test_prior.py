@@ -123,9 +123,9 @@ def test_it_goes_on_from_its_state_exactly():
         again.tell(other, 0.0)
 
 
-def test_a_state_of_the_prior_by_families_is_refused():
-    with pytest.raises(CheckpointError, match="prior"):
-        optimizer().load(optimizer().state() | {"kind": "prior"})
+def test_a_state_with_other_weights_is_refused():
+    with pytest.raises(CheckpointError, match="weights"):
+        optimizer().load(optimizer().state() | {"weights": "of another release"})
 
 
 @pytest.mark.parametrize(("trust", "at_first", "later"), [(1.0, 0.2, 0.4), (0.1, 0.6, 0.6)])
