@@ -320,7 +320,7 @@ def test_a_request_names_only_defects_that_exist_and_fit(client):
     assert listed["latency"] == "perception"
 
 
-@pytest.mark.parametrize("ego", [{"driver": "idm-aeb", "defects": ("latency",)}, {"defects": ("sumo-short-headway",)}])
+@pytest.mark.parametrize("ego", [{"driver": "idm-aeb", "defects": ("latency",)}, {"defects": ("sumo-distracted",)}])
 def test_records_say_when_a_defect_was_reached_and_runs_repeat(ego, tmp_path):
     spec = spec_of("idm-aeb", episodes=4).model_copy(update={"ego": EgoConfig.model_validate(ego)})
     (first, records), (second, _) = play(spec, tmp_path / "first"), play(spec, tmp_path / "second")

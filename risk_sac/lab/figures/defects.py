@@ -24,7 +24,7 @@ from risk_sac.lab.benchmark.runs import ANSWER, Benchmark, Detection, ego_with, 
 from risk_sac.run_folder.durable import replace_file
 
 UNDISTURBED = "iid-undisturbed"
-METHODS: tuple[MethodName, ...] = ("archive", "random")
+METHODS: tuple[MethodName, ...] = ("archive", "random", "risk-sac-diverse")
 FIRST_SEED = 1
 SCENE_STEPS = 150  # steps of a whole scene; shorter scenes make it more scenes
 EASY, HARD = 0.8, 0.2  # least and largest share of runs of random search that detect
