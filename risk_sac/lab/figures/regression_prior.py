@@ -24,8 +24,8 @@ from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.search.loop import execute_run
 from risk_sac.search.prior.earlier import pinned_prior
 
-# Family, faults of versions 1 and 2. Version 2 has the faults of mixed and dense, of the catalogue's test set, that
-# `risk-sac-diverse` detects in at least 4 of 5 runs of `report/measured/detections.csv`; of two alike only the first.
+# Family, faults of versions 1 and 2. Version 2 has the faults of mixed and dense, of the catalogue's test set, that the
+# first `risk-sac-diverse` of these definitions detected in at least 4 of 5 runs; of two alike only the first.
 PAIRS: tuple[tuple[FamilyName, str, str], ...] = (
     ("mixed", "blind-right", "pedestrian-range"),
     ("mixed", "blind-right", "kerb-waits"),
