@@ -102,7 +102,10 @@ class Parents:
             kinds.setdefault(episode.kind, []).append(episode.point)
 
     def draw(self, random: np.random.Generator) -> Floats | None:
-        """Draws a kind, and then one of its points; None where there are none of the drawn sort."""
+        """Draws a kind, and then one of its points.
+
+        Returns None where there is none of the drawn sort: candidates or others.
+        """
         kinds = self.candidates if random.random() < CANDIDATES else self.others
         if not kinds:
             return None

@@ -23,7 +23,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @cache
 def weights_digest() -> str:
-    """Returns the first 12 digits of the SHA-256 of all shipped files, by name."""
+    """Returns the beginning of the SHA-256 of all shipped files."""
     digest = hashlib.sha256()
     for path in sorted(DATA.glob("*.npz")):
         digest.update(path.name.encode() + path.read_bytes())
