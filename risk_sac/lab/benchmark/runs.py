@@ -241,5 +241,6 @@ def play(benchmark: Benchmark, out: Path, jobs: int) -> Iterator[Detection]:
                     yield future.result()
                 except (RiskSacError, OSError) as error:
                     logger.warning("%s: %s", pending[future].name, error)
-        finally:  # of the rest nothing begins
+        except BaseException:  # of the rest nothing begins
             pool.shutdown(wait=False, cancel_futures=True)
+            raise

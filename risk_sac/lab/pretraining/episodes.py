@@ -167,8 +167,8 @@ class EpisodeStream:
         if random.random() >= UNIFORM_SCENES:
             scene = np.clip(parent[:size] + random.normal(0.0, SCENE_DEVIATION, size), 0.0, 1.0)
         if random.random() >= RANDOM_SCRIPTS:
-            other = self._parents.draw(random)
-            own, other = (parent, parent) if other is None else (parent, other)
+            own, drawn = parent, self._parents.draw(random)
+            other = parent if drawn is None else drawn
             if random.random() >= FAITHFUL:
                 own, other = other, own
             genes = own[size:] if random.random() < UNCHANGED else mutated(own[size:], other[size:], random)
