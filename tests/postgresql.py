@@ -4,7 +4,6 @@ import os
 import pwd
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import time
@@ -15,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import psycopg
+
+from tests.ports import free_port
 
 DEBIAN = Path("/usr/lib/postgresql")  # its package leaves initdb off the PATH
 QUIET: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.STDOUT, "cwd": "/"}
@@ -76,8 +77,7 @@ def running(bin_: Path) -> Iterator[PostgreSql]:
     with tempfile.TemporaryDirectory(prefix="postgresql-") as data:
         if user:
             os.chown(data, pwd.getpwnam(user).pw_uid, -1)
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            port = probe.getsockname()[1]
+        port = free_port()
         initdb = [bin_ / "initdb", "-D", data, "-U", "tests", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"]
         subprocess.run(initdb, check=True, user=user, **QUIET)
         options = ["-D", data, "-p", str(port), "-h", "127.0.0.1", "-k", "", "-c", "fsync=off"]

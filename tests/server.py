@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -13,6 +12,8 @@ from types import MappingProxyType
 from typing import Any
 
 import httpx
+
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[1]
 SCRIPTED = ROOT / "tests" / "integration"  # workers that do what a test needs
@@ -27,8 +28,7 @@ class Service:
     ) -> None:
         self.data_dir = data_dir
         self.log = data_dir.with_name(f"{data_dir.name}.log")
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self.environment = os.environ | {
             "PYTHONPATH": os.pathsep.join([str(ROOT), str(SCRIPTED), os.environ.get("PYTHONPATH", "")]),
             "MALLOC_ARENA_MAX": "2",  # as `risk-sac serve` sets it

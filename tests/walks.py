@@ -6,7 +6,6 @@ numba compiled, and those of libraries, are not seen. `python -m tests.walks FOL
 
 import json
 import os
-import socket
 import sys
 import tempfile
 import threading
@@ -23,6 +22,7 @@ from risk_sac.client import Client
 from risk_sac.config import Budget, CampaignSpec
 from service.app import create_app
 from service.settings import ServiceSettings
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[1]
 HEARD = "RISK_SAC_WALKS"  # names the file that the worker writes
@@ -116,8 +116,7 @@ def work() -> None:
 def play(folder: Path) -> None:
     """Posts a campaign of one short run, awaits it, reads its episodes."""
     settings = ServiceSettings(data_dir=folder / "data", worker_module="tests.walks", replays=0, lease_s=60.0)
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
+    port = free_port()
     server = uvicorn.Server(uvicorn.Config(create_app(settings), port=port, log_level="error"))
     thread = threading.Thread(target=server.run)
     thread.start()

@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tomllib
@@ -19,6 +18,7 @@ from risk_sac.failures.bundle import read_bundle
 from risk_sac.run_folder.results import read_results
 from risk_sac.scenario.library import VARIABLE
 from tests.maps import osm_town
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[2]
 EGOS = ROOT / "risk_sac" / "egos"
@@ -43,11 +43,6 @@ class Told:
 
 def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S)
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return int(probe.getsockname()[1])
 
 
 def command(folder: Path, name: str, arguments: str) -> None:
