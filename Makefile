@@ -16,17 +16,17 @@ help: ## list the targets
 
 install: $(STAMP) ## make .venv with the pinned versions
 
-# pip compiles on one core. Some packages have files for other versions of Python, which do not compile.
+# pip would compile on one core. A few files of packages are for other versions of Python, and fail to compile.
 $(STAMP): pyproject.toml constraints.txt
 	@python=$$($(FIND_PYTHON)); \
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e ".[dev,export]"
-	@$(PYTHON) -m compileall -qq -j 0 -x '/tests?/' .venv/lib || true
 	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
+	$(PYTHON) -m compileall -qq -j 0 -x '/tests?/' .venv/lib & \
 	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
 	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \
-		$(PYTHON) -m risk_sac run --scenario $$run --seed 1 --out "$$folder/$${run%% *}" > /dev/null; done
+		$(PYTHON) -m risk_sac run --scenario $$run --seed 1 --out "$$folder/$${run%% *}" > /dev/null; done; wait
 	@touch $@
 
 page: $(STAMP) ## build the web page anew, after a change of its sources
